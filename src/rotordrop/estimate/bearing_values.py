@@ -82,13 +82,25 @@ if TYPE_CHECKING:
 Factor = Callable[[float], float]
 
 
-def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, Known]:
-    """Severity of one bearing by the fields of `severity.numbers.SEVERITY`; what is not known is left out.
+FATIGUE = "severity.fatigue_by_16281"
+NOT_BORNE = "the balls bear no such force"
+
+
+def with_severity(estimate: Estimate, bearing: BearingDrop) -> BearingDrop:
+    """The bearing with its severity among its values, by the fields of `severity.numbers.SEVERITY`.
 
     Intervals follow from those of the peaks and impacts. Impulse and energy add the errors of all impacts as
     if they were one, because they rest on the same contact and the same machine.
     """
-    return dict(_values(estimate, bearing))
+    values, missing = {**bearing.values, **dict(_values(estimate, bearing))}, bearing.missing
+    if bearing.force_vector is not None and bearing.impacts:
+        own = numbers_of(estimate.machine.bearing(bearing.name))
+        try:
+            loads = own.element_loads_under(bearing.force_vector)
+            values[FATIGUE] = _fatigue(bearing, own.ratings(), loads, estimate.speed)
+        except SimulationError:  # no reason to lose the rest
+            missing = {**missing, FATIGUE: NOT_BORNE}
+    return replace(bearing, values=values, missing=missing)
 
 
 def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
@@ -105,13 +117,6 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
         yield "severity.impulse_N_s", _sum([one.impulse for one in bearing.impacts], "N s")
         yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
     yield from _indices(estimate, bearing)
-    if bearing.force_vector is not None and bearing.impacts:
-        own = numbers_of(estimate.machine.bearing(bearing.name))
-        try:
-            loads = own.element_loads_under(bearing.force_vector)
-        except SimulationError:  # a force beyond all balls: no reason to lose the rest
-            return
-        yield from _fatigue(bearing, ratings, loads, estimate.speed)
 
 
 def static_safety_of_stress(stress: float) -> float:
@@ -167,9 +172,7 @@ def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kn
         yield "severity.velocity_index", _falling(gap, lambda value: rms / estimate.speed / value)
 
 
-def _fatigue(
-    bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float
-) -> Iterator[tuple[str, Known]]:
+def _fatigue(bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float) -> Known:
     """Share of the rating life as if the race turned with the rotor from the first impact on.
 
     It turns slower, so that the number is an upper end; the lower one is nothing.
@@ -179,5 +182,4 @@ def _fatigue(
     _, high = bearing.peak_force.interval_90 or (0.0, bearing.peak_force.value)
     share = fatigue_share(ratings, time, loads, spin)
     most = (high / bearing.peak_force.value) ** 3 * share  # as the life goes with the load
-    known = Known(value=share, status=bearing.peak_force.known.status, interval_90=(0.0, most), unit="1")
-    yield "severity.fatigue_by_16281", known
+    return Known(value=share, status=bearing.peak_force.known.status, interval_90=(0.0, most), unit="1")

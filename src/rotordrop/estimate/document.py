@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from rotordrop._version import __version__
@@ -27,12 +26,7 @@ def published_drop(estimate: Estimate) -> Drop:
         fingerprint=fingerprint(),
         method="replay" if isinstance(method, Replay) else "tracked",
         quick=not isinstance(method, Replay) and method.quick,
-        bearings={
-            bearing.name: Bearing.of_result(
-                replace(bearing, values={**bearing.values, **estimate.severity[bearing.name]})
-            )
-            for bearing in estimate.bearings
-        },
+        bearings={bearing.name: Bearing.of_result(bearing) for bearing in estimate.rated},
         **replayed,
     )
 

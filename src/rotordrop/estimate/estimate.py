@@ -22,7 +22,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import needing
 from rotordrop.estimate.bearing_drop import BearingDrop
-from rotordrop.estimate.bearing_values import severity_values
+from rotordrop.estimate.bearing_values import with_severity
 from rotordrop.estimate.published import (
     Advice,
     Agreement,
@@ -302,9 +302,9 @@ class Estimate:
         return self.verdict.holds
 
     @cached_property
-    def severity(self) -> dict[str, dict[str, Known]]:
-        """How severe the drop was, by the name of a bearing and the fields of `severity.numbers.SEVERITY`."""
-        return {bearing.name: severity_values(self, bearing) for bearing in self.bearings}
+    def rated(self) -> tuple[BearingDrop, ...]:
+        """The bearings with the fields of `severity.numbers.SEVERITY` among their values."""
+        return tuple(with_severity(self, bearing) for bearing in self.bearings)
 
     @property
     def later_warning(self) -> str:

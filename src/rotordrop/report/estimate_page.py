@@ -352,7 +352,7 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
 
 def _severity(estimate: Estimate) -> Section:
     """Means, safety, impulse, energy, indices, fatigue of a drop by bearing, and what they rest on."""
-    found = {b.name: {**b.missing, **b.values, **estimate.severity[b.name]} for b in estimate.bearings}
+    found = {b.name: {**b.missing, **b.values} for b in estimate.rated}
     uncertain = not estimate.consistent
 
     def at(name: str) -> Column:

@@ -219,9 +219,9 @@ def derived(document):
 def test_no_number_of_the_report_is_missing_in_the_document_or_in_python(estimate, page, document):
     written = {*in_python(document, set()), *derived(document)}
     known = {*in_python(estimate, set()), *derived(document)}
-    for bearing in estimate.bearings:
+    for bearing in estimate.rated:
         more = (bearing.peak_force.known, bearing.peak_stress.known, bearing.statistics.as_json())
-        known |= {*in_python([*estimate.severity[bearing.name].values(), *more], set())}
+        known |= {*in_python([*bearing.values.values(), *more], set())}
         known |= {one.value for one in bearing.values.values()}
     compared = 0
     for number in numbers(page):

@@ -30,6 +30,15 @@ def test_a_number_that_is_missing_has_its_reason(page, document):
     assert missing == {"mean_force_0p15_0p2_N": "estimate ends before 200 ms"}
 
 
+def test_a_force_that_the_balls_do_not_bear_costs_the_share_of_a_life_alone(estimate):
+    first, *others = estimate.bearings
+    crushed = replace(first, force_vector=1e12 * first.force_vector)
+    told = estimate_document(replace(estimate, bearings=(crushed, *others)))["bearings"]
+    severities = [told[name]["severity"] for name in ("NDE", "DE")]
+    assert severities[1].keys() - severities[0].keys() == {"fatigue_by_16281"}
+    assert told["NDE"]["not_stated"]["severity.fatigue_by_16281"] == "the balls bear no such force"
+
+
 def test_a_record_is_simulated_by_one_definition(estimate, page, document):
     assert page.simulated == "Simulated record." and document["simulated_record"] is True
     other = replace(estimate.record, sha256="0" * 64, metadata={}, notes=())
