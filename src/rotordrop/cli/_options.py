@@ -65,8 +65,7 @@ def pairs(texts: Sequence[str] | None, expected: str) -> dict[str, str]:
 
 def refuse_beside(option: str, others: Mapping[str, object]) -> None:
     """Refuse what has no meaning beside an option that makes another command of a verb."""
-    given = [name for name, value in others.items() if value is not None]
-    if given:
+    if given := [name for name, value in others.items() if value is not None]:
         raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 

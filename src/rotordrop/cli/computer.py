@@ -84,15 +84,13 @@ def doctor(
 
     def summarise(out: Console) -> None:
         out.print(f"rotordrop {found['rotordrop']}, Python {found['python']}, {found['system']}")
-        for name, one in found["packages"].items():
-            if one is None:
-                out.print(f"problem: {name} is missing; install rotordrop again: pip install rotordrop")
-        out.print(
-            f"{sum(one is not None for one in found['packages'].values())} packages it needs are there."
-        )
+        lost = [name for name, one in found["packages"].items() if one is None]
+        for name in lost:
+            out.print(f"problem: {name} is missing; install rotordrop again: pip install rotordrop")
+        out.print(f"{len(found['packages']) - len(lost)} packages it needs are there.")
         for extra, one in found["extras"].items():
-            lost = ", ".join(name for name, number in one["packages"].items() if number is None)
-            state = f"missing: {lost}; pip install 'rotordrop[{extra}]'" if lost else "installed"
+            without = ", ".join(name for name, number in one["packages"].items() if number is None)
+            state = f"missing: {without}; pip install 'rotordrop[{extra}]'" if without else "installed"
             out.print(f"extra {extra} ({one['for']}): {state}")
         for line in cache_lines(found["cache"]):
             out.print(line)
