@@ -85,7 +85,7 @@ def _loaded(text: str, file: Path | None, folder: Path) -> Machine:
     try:
         machine = Machine.model_validate(raw)
     except ValidationError as error:
-        raise _located(error, positions, file, table) from None
+        raise refusal(error, positions, file, table) from None
     if file is not None:
         machine._source_path = file  # the one moment before the machine leaves the house
     return machine
@@ -153,9 +153,10 @@ def _with_shaft_table(
     return folder / named, [section.pop(SECTION_LINE) for section in rotor["sections"]]
 
 
-def _located(
+def refusal(
     error: ValidationError, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
 ) -> MachineFileError:
+    """All that does not fit in a description, each with its key, the value and what was expected."""
     entries = error.errors()
     # A list that loses an entry to an error inside it is then called too short; that error is the cause.
     inside = {entry["loc"][:depth] for entry in entries for depth in range(len(entry["loc"]))}
@@ -186,7 +187,7 @@ def _one_error(
     # The key rather than the value is to blame where it is not known, or not there.
     at_key = isinstance(cause, UnknownKey) or (cause is None and entry["type"] == "missing")
     written = positions.written(place)
-    line, column = (positions.key(written) if at_key else positions.value(written)) or (1, 1)
+    line, column = (positions.key(written) if at_key else positions.value(written)) or positions.first
     told = f"{_dotted(written)}: {message}" if place else message
     return MachineFileError(told, file=file, line=line, column=column)
 
@@ -272,6 +273,7 @@ class TomlPositions:
         self._values: dict[Keys, Place] = {}
         self._counts: dict[Keys, int] = {}
         self._listed: dict[Keys, Keys] = {}
+        self.first = (1, 1) if text else (None, None)
         content = text.encode("utf-8")
         self._lines = content.split(b"\n")
         for child in Parser(Language(tree_sitter_toml.language())).parse(content).root_node.children:

@@ -85,6 +85,17 @@ class Machine(Description):
 
     _source_path: Path | None = PrivateAttr(default=None)
 
+    def __init__(self, **values: Any) -> None:
+        """Describe a machine by its parts, as a machine file does; `UsageError` says what does not fit."""
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            from rotordrop.machine.loading import TomlPositions, refusal  # it makes machines
+
+            raise UsageError(str(refusal(error, TomlPositions(""), None, None))) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # what validates goes past it
+
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Refuse a direction of gravity, for a later version, and a side force with a unit."""

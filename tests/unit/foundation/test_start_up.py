@@ -375,6 +375,7 @@ WRONG = {
     "text to save": (lambda: rd.save_machine("m", "m.toml"), "machine is 'm'; expected a Machine"),
     "list of examples": (lambda: rd.example_record_path(["x"]), "name is a list; expected a text"),
     "path of nothing": (lambda: rd.load_machine(None), "path is None; expected a text or a path"),
+    "gravity in m/s": (lambda: rd.Machine(gravity="9 m/s"), "gravity: '9 m/s' is not an acceleration"),
 }
 
 
