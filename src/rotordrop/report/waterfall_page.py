@@ -200,7 +200,7 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
         Column("× floor", lambda line: f"{line.ratio:.0f}"),
         Column("width", lambda line: f"{line.width:.2f} Hz" if line.width else "below resolution"),
         Column("seen", seen),
-        Column("confidence", lambda line: line.confidence if line.named else None, "probability"),
+        Column("confidence of the name", lambda line: line.confidence if line.named else None, "probability"),
     )
     return table(analysis.lines, columns, "Lines found, strongest first", LINES_NOTE)
 
