@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import Known
 from rotordrop.series import refined_peak
 from rotordrop.severity.statistics import Statistics, stress_statistics
 
 if TYPE_CHECKING:
+    from rotordrop.machine import Machine
     from rotordrop.simulate.result import DropResult
 
 Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]
@@ -209,7 +211,7 @@ class BearingDrop(BearingMotions):
     """Ball force on the race (x, y) [N] at the times of the force, where its direction is known, shape (T,
     2)."""
     preload_stress: float | None = None
-    """Stress of the preload alone [Pa]."""
+    """Stress of the preload alone [Pa]; None where there is none, or no time shows it."""
     values: Mapping[str, Known] = field(default_factory=dict)
     """Further numbers by the field names of the published document, means and parameters."""
     missing: Mapping[str, str] = field(default_factory=dict)
@@ -289,12 +291,15 @@ def deepest(motion: Motion, start: float, end: float, gap: float) -> FirstContac
     return FirstContact(start=start, end=end, indentation=reached - gap)
 
 
-def simulated_bearings(result: DropResult) -> tuple[BearingDrop, ...]:
-    """What happened at every bearing in a simulated drop; its numbers have no intervals."""
-    return tuple(_simulated_bearing(result, b) for b in range(len(result.bearing_names)))
+def simulated_bearings(result: DropResult, machine: Machine | None = None) -> tuple[BearingDrop, ...]:
+    """What happened at every bearing in a simulated drop; its numbers have no intervals.
+
+    The machine tells which races nothing but their weight presses on the balls.
+    """
+    return tuple(_simulated_bearing(result, b, machine) for b in range(len(result.bearing_names)))
 
 
-def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
+def _simulated_bearing(result: DropResult, b: int, machine: Machine | None) -> BearingDrop:
     name, log = result.bearing_names[b], result.contacts.of_bearing(b)
     gap = simulated_gap(result, b)
     motion = Motion(label="simulated", time=result.time, displacement=result.displacement[:, b])
@@ -304,7 +309,8 @@ def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
     if len(log):
         end = float(np.nan_to_num(log.end[0], nan=result.time[-1]))
         first = deepest(motion, float(log.start[0]), end, gap)
-    free = result.indentation[0, b] < 0.0  # a drop that starts free shows what the preload alone does
+    held = machine is None or numbers_of(machine.touchdown_bearings[b]).held
+    free = held and result.indentation[0, b] < 0.0  # it shows what the preload alone does
     impacts = []
     for i in range(len(log)):
         begun, ended = np.searchsorted(force.time, (log.start[i], np.nan_to_num(log.end[i], nan=np.inf)))

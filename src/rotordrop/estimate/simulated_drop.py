@@ -31,7 +31,7 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
     for name in ("peak_change_tolerance", "peak_change_truncation"):
         if (change := getattr(certificate, name)) is not None:
             parts[name] = change.tolist()
-    for index, one in enumerate(simulated_bearings(result)):
+    for index, one in enumerate(simulated_bearings(result, machine)):
         pressure, half_width, moment = result.peak_contact_pressure(index)
         bearings[one.name] = {
             **Bearing.of_result(one).as_json(),

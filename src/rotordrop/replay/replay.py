@@ -141,7 +141,7 @@ def replayed_drop(drop: TrackedDrop, method: Replay, facts: RecordFacts) -> Esti
     contacts = identify_first_contacts(time[known], measured[known], gap, shares, gravity, noise)
     later = motion_later(drop, believed=True)
     bearings = []
-    for b, simulated in enumerate(simulated_bearings(result)):
+    for b, simulated in enumerate(simulated_bearings(result, evidence.machine)):
         seen = Motion(label="measured", time=time[inside], displacement=measured[inside, b], role="measured")
         middle, lower, upper = (
             Motion(label=label, time=result.time, displacement=moved[:, b], role=role)

@@ -73,7 +73,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
 
     The machine gives weight shares, the friction law and the defaults in use.
     """
-    bearings = simulated_bearings(result)
+    bearings = simulated_bearings(result, machine)
     landed = () if machine is None else landings(machine, result)
     races = dict(zip(result.bearing_names, result.race_speed.T, strict=True))
     force, orbit, *rest = drop_sections(bearings, "simulated", weight_shares(machine))
@@ -140,7 +140,7 @@ BACKWARDS = "The speed is negative: the shaft turns from y towards x, clockwise 
 
 def simulate_summary(result: DropResult, machine: Machine | None = None) -> ReportContent:
     """Give what is said of one simulated drop before any figure; the machine gives the defaults in use."""
-    bearings = simulated_bearings(result)
+    bearings = simulated_bearings(result, machine)
     speed, duration = shown(result.initial_speed, "speed"), shown(result.time[-1], "time")
     uses = () if machine is None else clearance_uses(machine, result)
     return ReportContent(

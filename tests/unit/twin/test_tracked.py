@@ -436,6 +436,7 @@ def test_a_deep_groove_whose_balls_and_clearance_nobody_knows_is_followed(stated
         assert told.low < peak < told.high and told.high < 1.25 * told.low
         assert stated == "1 um" or gap.low < drop.truth["air_gap_m"][name] < gap.high
         assert "preload_N" not in found.bearing(name).values
+        assert found.bearing(name).preload_stress is None
 
 
 def test_the_band_of_a_stress_ends_near_none_where_the_balls_bear_next_to_nothing(workshop):
