@@ -63,11 +63,8 @@ class MachineFileError(RotordropError):
         self.file = None if file is None else str(file)
         self.line = line
         self.column = column
-        super().__init__(self._located(message))
-
-    def _located(self, message: str) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
-        return f"{place}: {message}" if place else message
+        super().__init__(f"{place}: {message}" if place else message)
 
 
 class RecordError(RotordropError):

@@ -21,12 +21,8 @@ Shown = Progress | Literal[False] | None
 
 def is_shown() -> bool:
     """Whether somebody sees a bar: standard error is a terminal, or a notebook has it."""
-    return (sys.stderr is not None and sys.stderr.isatty()) or _in_notebook()
-
-
-def _in_notebook() -> bool:
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    return hasattr(shell, "kernel")
+    return (sys.stderr is not None and sys.stderr.isatty()) or hasattr(shell, "kernel")
 
 
 @contextmanager

@@ -109,10 +109,8 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
         yield "severity.static_safety", _falling(stress.known, static_safety_of_stress)
     ratings = numbers_of(estimate.machine.bearing(bearing.name)).ratings()
     if force.value > 0.0:
-        yield (
-            "severity.static_safety_of_rating",
-            _falling(force.known, lambda load: static_safety_of_load(ratings.static, load)),
-        )
+        # ISO 76: C0 / P0 where no axial force acts from outside; the preload counts in the stress alone
+        yield "severity.static_safety_of_rating", _falling(force.known, lambda load: ratings.static / load)
     if "impacts" not in bearing.missing:
         yield "severity.impulse_N_s", _sum([one.impulse for one in bearing.impacts], "N s")
         yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
@@ -126,15 +124,6 @@ def static_safety_of_stress(stress: float) -> float:
     ball; its load goes with the cube of the stress.
     """
     return (STATIC_STRESS / stress) ** 3
-
-
-def static_safety_of_load(rating: float, force: float) -> float:
-    """Static safety factor s0 of a radial force [N] for a static load rating C0 [N], ``C0 / P0`` [1].
-
-    Source: ISO 76, with the radial force as equivalent load P0 where no axial one acts from outside. The
-    preload counts in the stress, not here.
-    """
-    return rating / force
 
 
 def _falling(known: Known, factor: Factor) -> Known:

@@ -258,13 +258,10 @@ def _events(estimate: Estimate) -> list[dict[str, Any]]:
             events.append((bearing.contact_from, f"last impact at {bearing.name}, {AFTER_LAST}"))
         peak = bearing.peak_force
         if peak.time_interval_90 is not None:
-            early, late = (_milliseconds(abs(end - peak.time)) for end in peak.time_interval_90)
+            off = [1e3 * abs(end - peak.time) for end in peak.time_interval_90]
+            early, late = (f"{time:.2g}" if time < 99.5 else f"{time:.0f}" for time in off)
             events.append((peak.time, f"largest force at {bearing.name} (−{early}, +{late} ms)"))
     return [{"time": time, "words": words} for time, words in sorted(events) if math.isfinite(time)]
-
-
-def _milliseconds(time: float) -> str:
-    return f"{1e3 * time:.2g}" if time < 0.0995 else f"{1e3 * time:.0f}"
 
 
 def _origin(job: Job, options: Mapping[str, Any], verb: str) -> Origin:

@@ -77,6 +77,7 @@ BALLS = (
     "their number, diameter and conformity, from the maker",
 )
 """Why the stress of a bearing is known no better than its force, and what would narrow it."""
+BEAM = "the beam in place of the rotor"
 EXPECTED = "90 % expected by the filter"
 LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
 SHOWN_SHARE = 0.995
@@ -221,7 +222,8 @@ def width_advice(estimate: Estimate) -> Iterator[str]:
             cause = remedy = ""
             if left < WORTH:
                 best = estimate.advice[lefts.index(left)]
-                cause, remedy = ", ".join(dict.fromkeys(map(_cause, best.paths))), best.measurement
+                causes = (BEAM if path == "rotor" else row_of(path).label for path in best.paths)
+                cause, remedy = ", ".join(dict.fromkeys(causes)), best.measurement
             found.setdefault(("Force", cause, remedy), []).append((bearing.name, half, half * left))
         if stress.allowance_90 and numbers_of(estimate.machine.bearing(bearing.name)).stress_sigma:
             half, rest = 0.5 * (stress.high - stress.low) / stress.value, stress.allowance_90 / stress.value
@@ -235,10 +237,6 @@ def width_advice(estimate: Estimate) -> Iterator[str]:
                 yield f"{known}; no one measurement of the machine would narrow it much."
             else:
                 yield f"{known} because of {cause}; would become ± {_per_cent(then)} % with {remedy}."
-
-
-def _cause(path: str) -> str:
-    return "the beam in place of the rotor" if path == "rotor" else row_of(path).label
 
 
 def _per_cent(shares: Sequence[float]) -> str:

@@ -47,6 +47,8 @@ def machine_content(
     machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
 ) -> ReportContent:
     """What a machine amounts to, and what to know before trusting its description."""
+    free, resting = (", ".join(f"{one:.4g}" for one in of[:3]) for of in (summary.free_free, summary.settled))
+    mass = shown(summary.fe.total_mass, "mass")
     return ReportContent(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
@@ -54,7 +56,7 @@ def machine_content(
         verdict=(
             _verdict(warnings),
             *(Statement(f"{one.message}.", "warning") for one in warnings if one.kind == CRITICAL),
-            _rotor(summary),
+            Statement(f"Mass {mass}; free-free {free} Hz; on massless supports {resting} Hz."),
             *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
             *map(Statement, _remarks(one for one in warnings if not (one.doubtful or one.kind == CRITICAL))),
         ),
@@ -103,13 +105,6 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
     gap = fact("air gap", machine.bearing(rest.name).air_gap, "length")
     tangent = fact("tangent stiffness at rest", rest.tangent_stiffness, "stiffness")
     return Card(rest.name, (load, gap, *figures, tangent))
-
-
-def _rotor(summary: MachineSummary) -> Statement:
-    """Mass and lowest modes of a rotor in a sentence, short enough for the first screen."""
-    free, resting = (", ".join(f"{one:.4g}" for one in of[:3]) for of in (summary.free_free, summary.settled))
-    mass = shown(summary.fe.total_mass, "mass")
-    return Statement(f"Mass {mass}; free-free {free} Hz; on massless supports {resting} Hz.")
 
 
 def rotor_tables(summary: MachineSummary) -> tuple[Table, ...]:

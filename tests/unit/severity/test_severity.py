@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.catalog.inference import dynamic_rating
 from rotordrop.errors import UsageError
-from rotordrop.estimate.bearing_values import static_safety_of_load, static_safety_of_stress
+from rotordrop.estimate.bearing_values import static_safety_of_stress
 from rotordrop.machine import example_machine
 from rotordrop.severity.fatigue import LIFE, ball_row, fatigue_share, share_by_16281
 from rotordrop.severity.numbers import SEVERITY
@@ -26,7 +26,6 @@ def numbers():
 def test_ratings_follow_from_balls_and_stresses(numbers):
     assert static_safety_of_stress(4.2e9) == 1.0
     assert static_safety_of_stress(2.1e9) == pytest.approx(8.0)
-    assert static_safety_of_load(40e3, 10e3) == 4.0
     found = numbers.ratings()
     assert found.rows == 2 and found.balls == 23
     assert found.static / 2 == pytest.approx(30.9e3, rel=0.01)
