@@ -23,7 +23,7 @@ from rotordrop.track.smoother import Smoothed, has_diverged
 from rotordrop.twin.mixture import mixed
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, symmetric, with_interval
 
-LOOSE_SIGMA = 0.04
+LOOSE_SIGMA = 0.06
 """Standard deviation of the logarithm of friction and supports that a loose race adds, followed as a held one
 [1]."""
 STAND_FOR_PLAY = ("contact.", "race.", "damping_time")
@@ -160,6 +160,7 @@ def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening
         replace(
             value,
             status=UNDETERMINED,
+            standard_error=None,
             interval_90=_hull(value, identified(unknown, unknown.mean, unknown.sigma)),
         )
         if value.status != AT_BOUND and stands_in(unknown)

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from rotordrop.document import stated
 from rotordrop.elements.catalog.boundary import (
+    CLASSES,
     DIMENSION_SERIES,
     PRELOAD_CLASSES,
     PreloadClass,
@@ -125,6 +126,10 @@ def _found(
     read = read_designation(designation)
     if read is None:
         raise UnknownBearingError(_unknown(designation, _nearest(designation)))
+    unknown = next((one for one in read.unread if re.fullmatch(r"C\d", one.upper())), None)
+    if read.kind == "deep groove" and unknown is not None:
+        classes = ", ".join(CLASSES)
+        raise UnknownBearingError(f"{designation}: {unknown} is no class of clearance; choose {classes}")
     listed = _index().get(_key(_listed_name(read)))
     if listed is not None:
         return replace(listed, read=read)
