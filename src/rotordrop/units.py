@@ -329,9 +329,8 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
         turns = value / (2 * math.pi)
         return f"{_rounded(turns, digits)} Hz ({_rounded(60 * turns, max(digits, 4))} rpm)"
     size = abs(value) * (1 + 0.5 * 10.0**-digits)
-    factor, unit = next(
-        (scale for scale in scales if size >= scale[0]), scales[-1] if size > 0 else scales[0]
-    )
+    fits = (scale for scale in scales if (size >= scale[0] if size > 0.0 else scale[0] == 1.0))
+    factor, unit = next(fits, scales[-1] if size > 0.0 else scales[0])
     number = _rounded(value / factor, digits)
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 

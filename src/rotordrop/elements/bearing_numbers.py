@@ -479,7 +479,7 @@ class BearingNumbers:
         carried = self.constants.preload_ball_load if self.held else float(np.max(self.ball_loads(load)))
         if force > CENTRIFUGAL_SHARE * carried:
             thrown, against = format_quantity(force, "force"), format_quantity(carried, "force")
-            what = "its preload of" if self.held else "the load of the lowest ball at rest,"
+            what = "its load by the preload," if self.held else "the load of the lowest ball at rest,"
             text = (
                 f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against {what}"
             )

@@ -170,6 +170,7 @@ def test_any_text_gives_a_finite_number_or_a_usage_error(text):
         (7000.0, "frequency", "7.00 kHz"),
         (1.66e9, "pressure", "1660 MPa"),
         (1e8, "stiffness", "100 MN/m"),
+        (0.0, "force", "0 N"),
         (-513.2, "force", "-513 N"),
         (12345.0, "force", "12.3 kN"),
         (math.pi / 4, "angle", "45.0°"),
