@@ -14,6 +14,7 @@ from pydantic import Field, Strict
 from rotordrop.elements import values as V
 from rotordrop.elements.catalog.boundary import (
     CLASSES,
+    LISTED_BORES,
     PRELOAD_CLASSES,
     PRELOAD_FACTOR,
     ClearanceClass,
@@ -571,13 +572,16 @@ def _by_offset(bearing: Any) -> Measure:
 def clearance_sigma(balls: BallBearing) -> float:
     """Standard deviation of a clearance [m]: by its range, else as a class leaves it and a fit takes away.
 
-    As wide as CN of ISO 5753-1 for the bore; a third of the clearance where the bore is not known.
+    As wide as CN of ISO 5753-1 for the bore, or the nearest one that it lists.
     """
     assert balls.clearance is not None
-    within = balls.clearance.range
-    if within is None and balls.bore_diameter is not None:
-        within = clearance_range("CN", balls.bore_diameter.value)
-    return balls.clearance.value / 3.0 if within is None else (within[1] - within[0]) / (2.0 * NINETY)
+    within = balls.clearance.interval_90 or balls.clearance.range
+    if within is None:
+        bore = balls.pitch_diameter.value - 2.0 * balls.ball_diameter.value / _BALL_HEIGHT
+        bore = balls.bore_diameter.value if balls.bore_diameter else bore
+        within = clearance_range("CN", min(max(bore, LISTED_BORES[0]), LISTED_BORES[1]))
+    assert within is not None
+    return (within[1] - within[0]) / (2.0 * NINETY)
 
 
 PARAMETERS: tuple[Parameter, ...] = (

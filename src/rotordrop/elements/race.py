@@ -126,7 +126,7 @@ def _with_carrier(bearing: Any) -> dict[str, Known]:
     What the mass of a loose race is found to be stands in for its play.
     """
     race: Race | None = bearing.race
-    if race is None or race.mass.status != "inferred" or bearing.bearing.clearance is not None:
+    if race is None or race.mass.status != "inferred" or not bearing.bearing.numbers().held:
         return {}
     values = {}
     for name, least in (("mass", RACE_MASS), ("inertia", RACE_MASS * RACE_FORM)):

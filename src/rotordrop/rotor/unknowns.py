@@ -196,7 +196,7 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
         if not row.entries or float(quantity := row.described(bearing)) == 0.0:
             continue
         if row.estimated_by is not None:
-            if bearing.bearing.clearance is not None:
+            if model.play_sigma(index) > 0.0:
                 continue  # the preload of a race that is only held lightly is nobody's
             measure = row.estimated_by(bearing)
             known = _by_measure(row, quantity, measure)

@@ -189,9 +189,10 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     smoothed = replace(smoothed, means=means, watched=smoothed.watched[steps // substeps])
     values, gradients, contacts = _values_at(problem, time, means)
     sigma = _standard_deviations(smoothed, gradients)
-    if (play := problem.model.play) is not None:
-        for part, share in ((FORCE, LOOSE_FORCE_SIGMA), (STRESS, LOOSE_STRESS_SIGMA)):
-            sigma[..., part] = np.hypot(sigma[..., part], share * (play[1] > 0.0) * values[..., part])
+    for b in range(values.shape[1]):
+        if problem.model.play_sigma(b) > 0.0:
+            for part, share in ((FORCE, LOOSE_FORCE_SIGMA), (STRESS, LOOSE_STRESS_SIGMA)):
+                sigma[:, b, part] = np.hypot(sigma[:, b, part], share * values[:, b, part])
     displacement, displacement_sigma = displacements_of(problem, smoothed)
     touching = contacts[..., 0] > 0.0
     return ForceHistory(

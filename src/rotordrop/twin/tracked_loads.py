@@ -398,7 +398,7 @@ def bearing_drop(
     ``doubt`` is half the 90 % interval of power-off [s], from which times count.
     """
     name = problem.model.bearing_names[b]
-    gap, play = values[AIR_GAP.field], problem.model.play
+    gap, loose = values[AIR_GAP.field], problem.model.play_sigma(b) > 0.0
     estimated = Motion(
         label="estimated", time=forces.time, displacement=forces.displacement[:, b], role="estimated"
     )
@@ -426,7 +426,7 @@ def bearing_drop(
         force_vector=forces.force[:, b] if force.peak.origin is Origin.TWIN else None,
         stress=stress.history,
         stress_band=stress.band,
-        preload_stress=float(stress.history.values[0]) if play is None or play[1, b] == 0.0 else None,
+        preload_stress=None if loose else float(stress.history.values[0]),
         peak_force=replace(force.peak, time_interval_90=(begin, end)),
         peak_stress=replace(stress.peak, time_interval_90=(min(begin, at), max(end, at))),
         values={**values, **loads.means},

@@ -217,10 +217,8 @@ def _left_out(problem: DropProblem, unknown: Unknown) -> float:
 
 def _play_sigma(problem: DropProblem, unknown: Unknown) -> float:
     """Standard deviation of the play of the race that an unknown belongs to [m]; zero of all others."""
-    play = problem.model.play
-    if play is None or unknown.parameter.owner != "bearing":
-        return 0.0
-    return float(play[1, unknown.targets[0].row])
+    of_bearing = unknown.parameter.owner == "bearing"
+    return problem.model.play_sigma(unknown.targets[0].row) if of_bearing else 0.0
 
 
 def gap_of_record(problem: DropProblem, b: int) -> Known:

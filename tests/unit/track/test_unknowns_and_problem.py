@@ -135,6 +135,11 @@ def test_a_loose_race_is_followed_held_lightly_with_its_play_in_the_gap(lp400):
     unknowns = {u.path: u for u in all_unknowns(held)}
     assert "NDE.preload" not in unknowns
     assert unknowns["NDE.air_gap"].targets[0].shift == pytest.approx(held.play[0, 0], rel=1e-9)
+    ungiven = (
+        '{ rows = 1, clearance = "0 um", ball_diameter = "13 mm", ball_count = 14, pitch_diameter = "95 mm" }'
+    )
+    no_play = held_lightly(build_drop_model(scaled_machine(60.0, bearing=ungiven), "quick"))
+    assert no_play.play_sigma(0) == pytest.approx(held.play_sigma(0))  # by the bore that the balls leave
     rigid = build_drop_model(lp400, "quick")
     assert held_lightly(rigid) is rigid
 

@@ -357,11 +357,8 @@ def test_a_landing_sleeve_found_is_said_by_its_amount_and_goes_into_the_calibrat
     [(5e-3, 9e-3, "longer than the usual 2 ms"), (1e-4, 1e-3, "shorter than the usual 2 ms")],
 )
 def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, high, words):
-    extension = next(one for one in EXTENSIONS if one.name == "long remanence")
-    middle = 0.5 * (low + high)
-    value = Known(value=middle, interval_90=(low, high))
-    accepted = Accepted(extension=extension, gain=50.0)
-    assert words in accepted.structure(lp400, {"remanence.time_constant": value}, believed=True).sentence
+    value = Known(value=0.5 * (low + high), interval_90=(low, high))
+    assert words in sentence_of(lp400, "long remanence", {"remanence.time_constant": value})
 
 
 def sentence_of(machine, name, values, *, believed=True):

@@ -103,7 +103,8 @@ _RANGES = (
     (180, (2, 25), (20, 61), (53, 102), (91, 147), (135, 200)),
     (200, (2, 30), (25, 71), (63, 117), (107, 163), (150, 230)),
 )
-_LEAST_BORE = 6e-3  # [m], where the table begins
+LISTED_BORES = (6e-3, 200e-3)
+"""Bores between which the table of clearances holds [m]."""
 
 
 def clearance_range(group: ClearanceClass, bore: float) -> tuple[float, float] | None:
@@ -112,7 +113,7 @@ def clearance_range(group: ClearanceClass, bore: float) -> tuple[float, float] |
     It is the play of the free bearing across its diameter; a tight fit takes part of it away.
     Source: ISO 5753-1, deep-groove ball bearings with cylindrical bore, 6 to 200 mm.
     """
-    if bore < _LEAST_BORE:
+    if bore < LISTED_BORES[0]:
         return None
     for upper, *ranges in _RANGES:
         if bore <= 1e-3 * upper * (1.0 + 1e-9):

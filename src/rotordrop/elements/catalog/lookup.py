@@ -128,8 +128,8 @@ def _found(
         raise UnknownBearingError(_unknown(designation, _nearest(designation)))
     unknown = next((one for one in read.unread if re.fullmatch(r"C\d", one.upper())), None)
     if read.kind == "deep groove" and unknown is not None:
-        classes = ", ".join(CLASSES)
-        raise UnknownBearingError(f"{designation}: {unknown} is no class of clearance; choose {classes}")
+        told = f"{designation}: {unknown} is no class of clearance; choose {', '.join(CLASSES)}"
+        raise UnknownBearingError(told)
     listed = _index().get(_key(_listed_name(read)))
     if listed is not None:
         return replace(listed, read=read)
