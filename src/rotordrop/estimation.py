@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 FOLLOWED = Tracked()
+DOUBTED = "a fit against a warning can take several times as long; Ctrl-C leaves nothing half written"
 
 
 def estimate_drop(
@@ -81,7 +83,8 @@ def estimate_drops(
 ) -> Estimates:
     """Estimate several recorded drops of one machine; tracked ones share its parameters in one fit.
 
-    The result is a tuple with one table of all drops, ``.to_dataframe()``.
+    The result is a tuple with one table of all drops, ``.to_dataframe()``. What the gate warns of is logged
+    before the fit.
 
     Parameters
     ----------
@@ -137,6 +140,14 @@ def estimate_drops(
     machine = evidence[0].machine
     model = build_drop_model(machine)
     evidence = [insisted(one.with_facts(base=model)) for one in evidence]
+    doubts = [
+        f"{one.name}: {finding}"
+        for one, fact in zip(evidence, facts, strict=True)
+        for finding in fact.findings
+        if finding.severity == "warning"
+    ]
+    if doubts:
+        logging.getLogger("rotordrop").warning("\n".join((*doubts, DOUBTED)))
     with shown(progress, "estimating") as tell:
         quick = isinstance(method, Tracked) and method.quick
         drops = followed_drops(machine, evidence, quick=quick, progress=tell)

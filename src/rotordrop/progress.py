@@ -83,8 +83,9 @@ def _bar(title: str) -> Iterator[Progress]:
     log, handler = logging.getLogger("rotordrop"), logging.Handler(logging.INFO)
     with Bars(*columns, console=console, transient=sys.stderr.isatty()) as bars:
         task = bars.add_task(title, total=1.0)
-        # such as that kernels are compiled, which from Python nobody else says
+        # such as that kernels are compiled, which from Python nobody else says; a warning is said in full
         handler.emit = lambda record: bars.update(task, description=record.getMessage())  # type: ignore[method-assign]
+        handler.addFilter(lambda record: record.levelno < logging.WARNING)
         log.addHandler(handler)
         log.setLevel(logging.INFO)
         try:

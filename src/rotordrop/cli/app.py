@@ -249,9 +249,13 @@ def _discard_standard_output() -> None:
 
 def _print_log() -> None:
     """Show on standard error what the package logs, such as that kernels are compiled."""
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("%(message)s"))
-    log = logging.getLogger("rotordrop")
+
+    def emit(record: logging.LogRecord) -> None:
+        with suppress(OSError, ValueError):  # whoever read it has gone
+            print(printable(record.getMessage()), file=sys.stderr)  # above a bar, which replaces the stream
+
+    log, handler = logging.getLogger("rotordrop"), logging.Handler()
+    handler.emit = emit  # type: ignore[method-assign]
     log.addHandler(handler)
     log.setLevel(logging.INFO)
 

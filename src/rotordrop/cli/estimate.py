@@ -88,12 +88,9 @@ def estimate(
         made.save(place)
     for made, place in zip(estimates, reports, strict=False):
         write_report(estimate_page(made), place, fingerprint())
-    documents = [estimate_document(made) for made in estimates]
-    numbers = combined(documents, [made.name for made in estimates])
+    numbers = combined([estimate_document(made) for made in estimates], [made.name for made in estimates])
     deliver(numbers, json, screens, written=[*reports, *outputs], whole=everything)
-    inconsistent = [made for made in estimates if not made.consistent]
-    if inconsistent:
-        names = ", ".join(made.name for made in inconsistent)
+    if names := ", ".join(made.name for made in estimates if not made.consistent):
         raise ConsistencyError(f"{names}: model and record disagree; of force and stress only ranges hold")
 
 

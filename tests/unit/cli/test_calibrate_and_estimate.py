@@ -258,12 +258,20 @@ def test_a_stopped_calibration_leaves_no_file(interrupted, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_stopped_estimate_leaves_an_earlier_one_alone(interrupted, tmp_path):
-    earlier = tmp_path / "estimate.json"
+def test_an_estimate_stopped_at_a_warning_leaves_an_earlier_one_alone(interrupted, tmp_path, caplog):
+    """What the gate warns of is told before the fit, which such a record makes long."""
+    earlier, faulty = tmp_path / "estimate.json", another_drop(tmp_path)
+    with h5py.File(faulty, "r+") as file:
+        file["displacement/S_NDE_B"].attrs["scale"] *= 1.2
     earlier.write_text("{}")
-    arguments = ["estimate", LP400, RECORD, "--json", str(earlier), "--report", str(tmp_path / "r.html")]
-    assert run(arguments) == INTERRUPTED
-    assert [(file, file.read_text()) for file in tmp_path.iterdir()] == [(earlier, "{}")]
+    for record, told in (
+        (RECORD, ""),
+        (str(faulty), "second: wrong gain S_NDE_B: .* check sensitivity.*Ctrl-C"),
+    ):
+        arguments = ["estimate", LP400, record, "--json", str(earlier), "--report", str(tmp_path / "r.html")]
+        assert run(arguments) == INTERRUPTED
+        assert re.match(told or "$", words("".join(one.getMessage() for one in caplog.records)))
+        assert {*tmp_path.iterdir()} == {earlier, faulty} and earlier.read_text() == "{}"
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
