@@ -44,12 +44,12 @@ BETWEEN_LINES_S = 5.0
 
 
 @contextmanager
-def told_in_lines(title: str) -> Iterator[Progress]:
-    """Tell stage, fraction and time so far in lines on standard error, for a log; none where all is done."""
+def told_in_lines(title: str, pause: float = BETWEEN_LINES_S) -> Iterator[Progress]:
+    """Tell stage, fraction and time so far on standard error, for a log: a line after each pause [s]."""
     ended, latest, begun = Event(), [title], monotonic()
 
     def say() -> None:
-        while not ended.wait(BETWEEN_LINES_S):
+        while not ended.wait(pause):
             with suppress(OSError, ValueError):  # whoever read it has gone
                 sys.stderr.write(f"{latest[0]}, {monotonic() - begun:.0f} s so far\n")
 

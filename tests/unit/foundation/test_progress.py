@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rotordrop.progress import BETWEEN_LINES_S, shown, told_in_lines
+from rotordrop.progress import shown, told_in_lines
 
 
 @pytest.fixture
@@ -50,10 +50,9 @@ def test_notebooks_get_a_bar_and_who_gives_a_function_is_told(error, monkeypatch
     assert stream.getvalue() == ""
 
 
-@pytest.mark.slow
-def test_a_log_is_told_how_long_it_has_taken(capsys):
-    with told_in_lines("estimating") as tell:
+def test_a_log_is_told_how_long_it_has_taken(error):
+    stream = error(terminal=False)
+    with told_in_lines("estimating", pause=0.01) as tell:
         tell("a step", 0.1)
-        sleep(2.1 * BETWEEN_LINES_S)
-    told = capsys.readouterr().err  # also of a stage that lasts
-    assert re.match(r"(estimating: a step \(10 %\), ([5-9]|1\d) s so far\n){2}$", told)
+        any(sleep(0.01) or stream.getvalue().count("a step") > 1 for _ in range(3000))  # a stage lasts
+    assert re.search(r"(estimating: a step \(10 %\), \d+ s so far\n){2}", stream.getvalue())
