@@ -91,7 +91,7 @@ def estimate(
     numbers = combined([estimate_document(made) for made in estimates], [made.name for made in estimates])
     deliver(numbers, json, screens, written=[*reports, *outputs], whole=everything)
     if names := ", ".join(made.name for made in estimates if not made.consistent):
-        raise ConsistencyError(f"{names}: model and record disagree; of force and stress only ranges hold")
+        raise ConsistencyError(f"{names}: model and record disagree; of force and stress ranges hold at most")
 
 
 def _read(

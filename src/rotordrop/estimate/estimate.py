@@ -120,6 +120,10 @@ class Verdict(Enum):
         "The model does not follow the record and lost it at a bearing. Loads there are those of the "
         "independent cross-check, as ranges."
     )
+    UNDETERMINED = (
+        "The model does not follow the record, and the record says that sensors are not as described: force "
+        "and stress are not determined."
+    )
     OPEN_LOOP = (
         "This is the paper's route, an open-loop replay: one drop like the recorded one, without intervals. "
         "The tracked twin follows the record and states them."
@@ -128,7 +132,7 @@ class Verdict(Enum):
     @property
     def holds(self) -> bool:
         """Whether single numbers may be relied on within their intervals."""
-        return self not in (Verdict.WIDENED, Verdict.REPLACED)
+        return self not in (Verdict.WIDENED, Verdict.REPLACED, Verdict.UNDETERMINED)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -130,6 +130,11 @@ class Bearing(Document):
     not_stated: Annotated[dict[str, str], Of("missing")] = ABSENT
     """Numbers that are not stated, and why."""
 
+    def stated(self, field: str) -> Value | None:
+        """A number by its path; None where there is none, or it is not stated: without its force, none is."""
+        lost = {field, "peak_force_N"} & (self.not_stated or {}).keys()
+        return None if lost else self.numbers.get(field)
+
     @model_validator(mode="wrap")
     @classmethod
     def _from_json(cls, content: Any, handler: ModelWrapValidatorHandler[Bearing]) -> Bearing:

@@ -333,7 +333,7 @@ def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:
         for name, bearing in sorted(drop.bearings.items())
         for quantity, unit in sorted(QUANTITIES.items())
         # a number without an interval is no evidence
-        if (found := bearing.numbers.get(quantity)) is not None and (ends := found.interval) is not None
+        if (found := bearing.stated(quantity)) is not None and (ends := found.interval) is not None
     ]
     return LoggedDrop(
         machine=drop.machine,

@@ -253,7 +253,7 @@ class ComparedDrop:
 
         Of an estimate that is not consistent with its record the interval alone is shown.
         """
-        found = self.drop.bearings[bearing].numbers.get(number.field)
+        found = self.drop.bearings[bearing].stated(number.field)
         if found is None:
             return Quantity(value=math.nan, kind=number.shown_as)
         return Quantity(

@@ -65,7 +65,7 @@ from rotordrop.report.style import (
     words,
 )
 from rotordrop.series import peak_indices
-from rotordrop.severity.numbers import LOADS
+from rotordrop.severity.numbers import LOADS, NOT_DETERMINED
 from rotordrop.units import percent
 
 AROUND_PEAK = (2e-3, 6e-3)
@@ -100,13 +100,14 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         reason = bearing.missing.get(field, "")
         if field not in known and not reason:
             continue
-        value = Quantity.of(known.get(field), load.kind, range_only=not certain)
+        value = Quantity.of(None if reason else known.get(field), load.kind, range_only=not certain)
         when = moment_of(peaks[field]) if field in peaks and certain else ""
         at = f"at {when}" if when else ""
         note = "; ".join(filter(None, (at, reason)))
         figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
     origin = bearing.peak_force.origin
-    source = f", by the {origin.value}" if origin in (Origin.CROSS_CHECK, Origin.REPLAY) else ""
+    of_another = origin in (Origin.CROSS_CHECK, Origin.REPLAY) and "peak_force_N" not in bearing.missing
+    source = f", by the {origin.value}" if of_another else ""
     return Card(f"{bearing.name} touchdown bearing{source}", tuple(figures))
 
 
@@ -125,10 +126,13 @@ def moment_of(peak: Peak) -> str:
 def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = True) -> Statement:
     """Set the peak stresses beside the stress of the static load rating: passed, open or kept."""
     level: Level = "notice"
+    if any("peak_stress_Pa" in bearing.missing for bearing in bearings):
+        return Statement(f"The share of the static limit is {NOT_DETERMINED}.")
     shares: dict[str, list[str]] = {}
     for bearing in bearings:
         peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
         ends = " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in peak.ends))
+        ends = ends.replace("0 to", "at most") if ends.startswith("0 to") else ends
         shares.setdefault(ends, []).append(bearing.name)
         if (peak.value if certain else peak.ends[0]) >= STATIC_STRESS:
             level = "bad"
@@ -201,6 +205,8 @@ def stress_panel(bearing: BearingDrop, *, certain: bool = True) -> Panel:
 
 def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float], *, certain: bool) -> Section:
     """The whole force beside its stretch around the peak, where the 90 % interval can be seen."""
+    if any("peak_force_N" in bearing.missing for bearing in bearings):
+        return Section("Bearing force", (f"Force is {NOT_DETERMINED}.",))
     panels = [force_panel(bearing, loads, certain=certain) for bearing in bearings]
     near = [replace(panel.around(*AROUND_PEAK), title=f"{panel.title}, around its peak") for panel in panels]
     rows = [[replace(whole, peak=None), close] for whole, close in zip(panels, near, strict=True)]
@@ -212,6 +218,8 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float], *, certa
 
 
 def _stress(bearings: Sequence[BearingDrop], *, certain: bool) -> Section:
+    if any("peak_stress_Pa" in bearing.missing for bearing in bearings):
+        return Section("Hertz stress", (f"Stress and severity are {NOT_DETERMINED}.",))
     history = Figure(
         time_panels([[stress_panel(bearing, certain=certain)] for bearing in bearings], MEGA, "MPa"),
         "Largest Hertz stress of all balls at the inner race, instantaneous.",

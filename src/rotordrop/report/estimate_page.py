@@ -22,9 +22,11 @@ from rotordrop.estimate.estimate import (
     FittedParameter,
     Replay,
     TimedContact,
+    Verdict,
 )
 from rotordrop.estimate.published import Agreement
 from rotordrop.evidence.impacts import CONTACT_FROM
+from rotordrop.evidence.quality.finding import WIRING
 from rotordrop.known import NINETY, Known
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -107,7 +109,7 @@ AGREES = "The independent cross-check agrees within its known accuracy."
 SCOPE = "No acceptance limit was given: maker and operator agree on one (ISO 14839-5:2022)."
 SETTLE_FIRST = (
     "Before anything is concluded from force or stress: check machine file and record against each other "
-    "(data quality, sensors, air gap), and estimate again. The loads of this drop are known as ranges only."
+    "(data quality, sensors, air gap), and estimate again. Of its loads ranges are known at most."
 )
 ASSUMED = (
     "The rotor is linear: beam elements, reduced to its lowest modes and its shapes under bearing loads.",
@@ -252,7 +254,7 @@ def inspection_section(estimate: Estimate) -> Section:
     said = [] if estimate.consistent else [Statement(SETTLE_FIRST, "bad")]
     for bearing in estimate.bearings:
         highest = bearing.peak_stress.known.high
-        if highest >= STATIC_STRESS:
+        if highest >= STATIC_STRESS and "peak_stress_Pa" not in bearing.missing:
             text = (
                 f"{bearing.name}: look at balls and raceways for indentations before the next start. "
                 f"The peak stress may be as high as {shown(highest, 'pressure', 3)}; from "
@@ -268,12 +270,10 @@ def inspection_section(estimate: Estimate) -> Section:
     gaps = ", ".join(
         f"{bearing.name} {1e6 * limits.low:.0f} to {1e6 * limits.high:.0f} µm"
         for bearing in estimate.bearings
-        if (limits := bearing.values.get("air_gap_m")) is not None
+        if (limits := bearing.values.get("air_gap_m")) is not None and "peak_force_N" not in bearing.missing
     )
-    text = (
-        f"Next standstill: lift check (expect {gaps}; another gap is wear or a sensor that has moved), turn "
-        "each bearing by hand."
-    )
+    expected = f" (expect {gaps}; another gap is wear or a sensor that has moved)" if gaps else ""
+    text = f"Next standstill: lift check{expected}, turn each bearing by hand."
     return Section("What next", (), (*said, Statement(text), Statement(SCOPE)))
 
 
@@ -352,6 +352,8 @@ def _severity(estimate: Estimate) -> Section:
     """Means, safety, impulse, energy, indices, fatigue of a drop by bearing, and what they rest on."""
     found = {b.name: {**b.missing, **b.values} for b in estimate.rated}
     uncertain = not estimate.consistent
+    if estimate.verdict is Verdict.UNDETERMINED:
+        return Section("Severity")
 
     def at(name: str) -> Column:
         def stated(row: Number) -> Quantity | str:
@@ -578,7 +580,6 @@ def _other(check: CrossCheck) -> Quantity:
 
 
 GUESSED_ROTOR = "A beam stands for the rotor, in the cross-check too: the ranges are no 90 % intervals."
-_WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
 MEAN = "mean_force_0p15_0p2_N"
 OVER_GAP = "displacement / air gap"
 ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement", OVER_GAP)
@@ -622,7 +623,9 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
 
 def _remedies(estimate: Estimate) -> Iterator[str]:
     """What to do next, first what may well let the model fit."""
-    yield from (one.remedy for one in estimate.findings if one.severity == "warning" and one.kind in _WIRING)
+    yield from (one.remedy for one in estimate.findings if one.severity == "warning" and one.kind in WIRING)
+    if estimate.verdict is Verdict.UNDETERMINED:
+        return
     if estimate.machine.rotor.is_beam and not estimate.consistent:
         yield DRAWING  # nothing else that is measured makes a beam the rotor
         return

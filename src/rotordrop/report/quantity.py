@@ -152,6 +152,8 @@ class Quantity:
     def _range(self) -> str:
         """The interval; one without an end goes on."""
         low, high = self.interval_90 or (math.nan, math.nan)
+        if self.range_only and low == 0.0 < high:  # nothing is known of that end
+            low = -math.inf
         if math.isfinite(low) and not math.isfinite(high):
             return f"{self._with_unit(self._at(low))} or more"
         if math.isfinite(high) and not math.isfinite(low):

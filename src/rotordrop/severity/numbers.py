@@ -36,6 +36,8 @@ LOADS = (
     Number("mean_stress_Pa", "mean Hertz stress, 0 to 200 ms", "pressure", only_worsens=False),
 )
 """Force and stress, which every estimate states, in the order in which they are shown."""
+NOT_DETERMINED = "not determined"
+"""In their place where sensors are not as described."""
 
 _PURE = "dimensionless"
 _PLACES = 3

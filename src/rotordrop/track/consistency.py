@@ -105,8 +105,8 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
         name="filter",
         passed=not has_diverged(filtered),
         message=f"the filter followed {filtered.done} of {len(filtered.means)} samples",
-        remedy="plan with the upper ends; calibrate on two drops with their tails; check rotor, air gaps and "
-        "sensors of the machine file against the record",
+        remedy="check rotor, air gaps and sensors of the machine file against the record; calibrate on two "
+        "drops with their tails; until then plan with the upper ends",
     )
     checks = _checks(problem, smoothed, noise_factor)
     if followed.passed:

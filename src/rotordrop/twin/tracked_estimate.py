@@ -29,8 +29,10 @@ from rotordrop.estimate.estimate import (
 )
 from rotordrop.estimate.published import Advice, LaterMotion, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
+from rotordrop.evidence.quality.finding import WIRING
 from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
 from rotordrop.known import NINETY, Known
+from rotordrop.severity.numbers import LOADS, NOT_DETERMINED
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.forces import predicted_readings
 from rotordrop.track.input_state import InputEstimate, at_bearings
@@ -196,6 +198,9 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     if all(one.phase is None for one in unbalance):
         assumed |= dict.fromkeys(unbalance_notes(unbalance), "no unbalance phase")
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
+    warned = {one.kind for one in facts.findings if one.severity == "warning"}
+    if not judged.fits and not warned.isdisjoint(WIRING):  # the cross-check rests on the sensors too
+        judged = replace(judged, verdict=Verdict.UNDETERMINED)
     return Estimate(
         name=evidence.name,
         method=method,
@@ -368,6 +373,9 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
                 0.5 * (high - low),
             )
         )
+    if judged.verdict is Verdict.UNDETERMINED:
+        lost = {one.field: NOT_DETERMINED for one in LOADS}
+        found = [replace(one, missing={**one.missing, **lost}) for one in found]
     return tuple(found)
 
 

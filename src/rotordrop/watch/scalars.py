@@ -67,6 +67,8 @@ def _of_estimate(drop: Drop, watched: Watched | None) -> dict[str, Any]:
     """Peaks of the bearing where each is largest, and what the limits of the owner say of them."""
     found: dict[str, Any] = {"recorded": drop.recorded, "speed_Hz": drop.speed_Hz, "verdict": drop.verdict}
     places = []
+    if not all(one.stated("peak_force_N") for one in drop.bearings.values()):
+        return found | {"needs_person": drop.verdict}
     for name, unit in PEAKS:
         place, peak = drop.largest(f"{name}_{unit}")
         lower, upper = peak.interval or (None, None)

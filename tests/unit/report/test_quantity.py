@@ -84,6 +84,9 @@ def test_a_number_has_the_digits_of_its_error(value, error, text):
 def test_a_range_that_stands_for_its_number_has_its_level():
     known = Known(value=2.0, interval_90=(1.0, 3.0))
     assert Quantity.of(known, "force", range_only=True).levelled == "90 %: 1.0 to 3.0 N"
+    assert (
+        Quantity.of(replace(known, interval_90=(0.0, 3.0)), "force", range_only=True).text == "3.0 N or less"
+    )
     assert Quantity.of(known, "force").levelled == "2.0 N"
     assert quantity_json(Quantity.of(known, "force", range_only=True))["SI"] == ["90 %: 1.0 to 3.0 N", ""]
 

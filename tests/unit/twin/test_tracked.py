@@ -27,12 +27,14 @@ from rotordrop import (
 )
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.bearing_drop import LATE, Origin
-from rotordrop.estimate.document import combined, estimate_document
+from rotordrop.estimate.document import combined, estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import Drop, estimate_schema
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
 from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
+from rotordrop.evidence.quality import Finding
+from rotordrop.ledger.book import drop_of_estimate
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
@@ -486,8 +488,23 @@ def test_what_a_lost_twin_says_does_not_enter_the_cross_check(workshop, calibrat
     check = input_state_estimate(problem, corrections)
     failed = Check(name="sensor errors", passed=False, message="gain departs by 30 prior standard deviations")
     drop = replace(workshop, smoothed=lost, checks=(failed,))
-    estimate = told_of(drop, calibrated, synthetic)
+    facts = facts_of(
+        Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="hidden_060")
+    )
+    estimate = estimate_of(drop, Tracked(), facts)
     assert estimate.verdict is Verdict.REPLACED and not estimate.consistent
+    ends = Finding(kind="swapped ends", message="", remedy="exchange the planes", severity="warning")
+    wired = estimate_of(drop, Tracked(), replace(facts, findings=(ends,)))  # the cross-check knows no better
+    published = published_drop(wired)
+    for name, bearing in published.bearings.items():
+        assert bearing.numbers["peak_force_N"].value == estimate.bearing(name).peak_force.value
+        assert bearing.stated("peak_force_N") is bearing.stated("severity.impulse_N_s") is None
+    assert not drop_of_estimate(published, "1").severity
+    told = wired.summary()
+    assert (
+        "force and stress are not determined" in " ".join(told.split()) and told.count(" not determined") > 4
+    )
+    assert "To do next: exchange the planes.\n" in told and " N " not in told and " MPa" not in told
     for b, name in enumerate(BEARINGS):
         bearing = estimate.bearing(name)
         assert bearing.peak_force.origin is bearing.peak_stress.origin is Origin.CROSS_CHECK

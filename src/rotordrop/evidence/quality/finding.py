@@ -17,6 +17,8 @@ from rotordrop.units import KINDS, format_quantity, percent
 Severity = Literal["stop", "warning", "note"]
 
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
+WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
+"""Kinds that say that sensors are not as they are described, on which every method rests."""
 
 
 @dataclass(frozen=True, kw_only=True)
