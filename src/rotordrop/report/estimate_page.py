@@ -267,12 +267,15 @@ def inspection_section(estimate: Estimate) -> Section:
             "Look at the rest of the record before the next start: the largest load may not be among these."
         )
         said.append(Statement(text, "warning"))
-    gaps = ", ".join(
-        f"{bearing.name} {1e6 * limits.low:.0f} to {1e6 * limits.high:.0f} µm"
-        for bearing in estimate.bearings
-        if (limits := bearing.values.get("air_gap_m")) is not None and "peak_force_N" not in bearing.missing
-    )
-    expected = f" (expect {gaps}; another gap is wear or a sensor that has moved)" if gaps else ""
+    gaps = []
+    for bearing in estimate.bearings:
+        limits = bearing.values.get("air_gap_m")
+        if limits is None or "peak_force_N" in bearing.missing:
+            continue
+        play = numbers_of(estimate.machine.bearing(bearing.name)).play  # a gauge shows it with the gap
+        seen = f"{1e6 * (limits.low + play):.0f} to {1e6 * (limits.high + play):.0f} µm"
+        gaps.append(f"{bearing.name} {seen}{f' with {1e6 * play:.0f} µm of its play' if play else ''}")
+    expected = f" (expect {', '.join(gaps)}; another gap is wear or a sensor that has moved)" if gaps else ""
     text = f"Next standstill: lift check{expected}, turn each bearing by hand."
     return Section("What next", (), (*said, Statement(text), Statement(SCOPE)))
 

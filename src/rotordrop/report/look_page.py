@@ -323,7 +323,7 @@ def _gap_figure(plane: PlaneLook) -> KeyFigure:
     if plane.gap_interval_90 is None:
         return KeyFigure("air gap", Quantity(value=plane.gap, kind="length", digits=3), "as given")
     note = "by where the rotor touched" if plane.gap_determined else "not determined by this record"
-    return KeyFigure("air gap", _found(plane.gap, plane.gap_interval_90), note)
+    return KeyFigure("air gap and any play", _found(plane.gap, plane.gap_interval_90), note)
 
 
 def _found(value: float, interval: tuple[float, float] | None, kind: str = "length") -> Quantity:

@@ -618,7 +618,9 @@ def test_what_a_high_pass_or_a_stuck_channel_hides_is_not_stated(machine, whole_
             seen = look(replace(whole_drop, signals=signals), machine=of)
             assert {one.kind for one in seen.findings if one.severity == "stop"} == {kind}
             page = look_page(seen, drawn=False)
-            stated = {card.title for card in page.cards if "air gap" in {f.label for f in card.figures}}
+            stated = {
+                card.title for card in page.cards if "air gap and any play" in {f.label for f in card.figures}
+            }
             assert stated == ends
             assert ("impacts (" in page.verdict[0].text) == bool(ends)
 

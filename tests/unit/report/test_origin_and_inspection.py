@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from plotly.subplots import make_subplots
+from tests.scaled_machines import scaled_machine
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import simulated_bearings
@@ -103,5 +104,10 @@ def test_the_gap_of_a_lift_check_is_stated_by_its_interval(drop_result):
     gap = Known(value=436e-6, status="determined", interval_90=(407e-6, 465e-6), unit="m")
     nde, de = estimate(drop_result).bearings
     known = (replace(nde, values={"air_gap_m": gap}), de)
-    text = inspection_section(estimate(drop_result, bearings=known)).statements[0].text
-    assert "lift check (expect NDE 407 to 465 µm;" in text
+    for bearing, told in (
+        ('{ designation = "7016 CD", preload = "100 N" }', "expect NDE 407 to 465 µm;"),
+        ('{ designation = "6016", clearance = "40 um" }', "expect NDE 427 to 485 µm with 20 µm of its play;"),
+    ):
+        machine = scaled_machine(60.0, bearing=bearing)
+        text = inspection_section(estimate(drop_result, bearings=known, machine=machine)).statements[0].text
+        assert f"lift check ({told}" in text
