@@ -74,6 +74,8 @@ def test_a_ball_more_would_be_seen():
 def test_a_mistake_is_answered_with_the_nearest():
     with pytest.raises(LookupError, match="6013/C9: C9 is no class of clearance; choose C2, CN, C3, C4, C5"):
         find_bearing("6013/C9")
+    with pytest.raises(LookupError, match=r"'6313'; it has the series 60, 62, 70, .* grooves a 'clearance'"):
+        find_bearing("6313")
     with pytest.raises(LookupError, match=r"no bearing 'XCB71914-F'; did you mean .*XCB71914[CE]"):
         find_bearing("XCB71914-F")
     for typed, meant in (("HCB7O20C", "HCB7020C"), ("7OO8", "7008"), ("7OI4", "7014")):

@@ -170,10 +170,12 @@ def _nearest(designation: str) -> list[str]:
 def _unknown(designation: str, nearest: list[str], why: str = "") -> str:
     if re.match(r"NN|N[UJP]?\s?\d", designation.upper()):
         return f"{designation!r} names a roller bearing, and the model is one of balls; give another bearing"
-    hint = f"did you mean {' or '.join(nearest)}?" if nearest else "no designation is similar."
+    series = ", ".join(sorted(DIMENSION_SERIES, key=int))
+    hint = f"did you mean {' or '.join(nearest)}?" if nearest else f"it has the series {series}."
     return (
         f"the catalogue holds no bearing {designation!r}{why}; {hint} Else give the geometry: "
-        "'ball_diameter', 'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
+        "'ball_diameter', 'ball_count', 'pitch_diameter', and of deep grooves a 'clearance', of others "
+        "'contact_angle' and a 'preload' in N"
     )
 
 
