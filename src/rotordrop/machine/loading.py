@@ -116,6 +116,8 @@ def _syntax_error(lines: list[str], message: str, file: Path | None) -> MachineF
             f"{comma.group(1)},{comma.group(2)} has a decimal comma; write {point}, in quotes with its unit, "
             f'as in "{point} mm"'
         )
+    elif re.search(r"'\\n'|Unterminated", message):
+        reason = "not valid TOML: a text has no quote at its end"
     elif unquoted := _UNQUOTED.search(lines[line - 1]):
         written = f'"{unquoted.group(1)} {unquoted.group(2)}"'
         reason = f"not valid TOML: a value with a unit is a text: write {written} in quotes"

@@ -68,6 +68,8 @@ def match_sensors(
             one.bearing or "" for one in sensors if hits[one.name]
         }
         pairs, _ = pairs_of([channel for channel in recording.channels if channel.label in free])
+        if profile.likely:
+            left += [f"; {LIKELY!r} finds pairs for {len(pairs)} of {len(_by_plane(sensors))} planes"]
         if gone and len(missing) < len(sensors) and not pairs:
             raise UnmatchedError(
                 f"{place} has no channels of the plane {listed(sorted(gone))} (sensors {listed(missing)}); "

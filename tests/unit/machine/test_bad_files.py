@@ -22,7 +22,7 @@ BAD = [
     (GAP, 'air_gap = "0,25 mm"', r"'0,25 mm' has a decimal comma; use 0\.25 mm", '"0,25'),
     (GAP, "air_gap = { guess = 0,25 }", COMMA, "0,25"),
     (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
-    (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
+    (GAP, 'air_gap = "250 um', "not valid TOML: a text has no quote at its end", "air_gap"),
     (NAME, "name = small", 'a text stands in quotes: write "small"', "small"),
     (NAME, f'{NAME}\nname = "other"', "name stands here for the second time; keep one", 'name = "other"'),
     # keys

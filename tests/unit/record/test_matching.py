@@ -264,6 +264,8 @@ def test_a_channel_of_pulses_is_offered_by_its_name(machine):
     marked = recording(*API, extra=(channel("Ch5 KPH", "V", np.tile([-1.0, -9.0], 5)),))
     (asked,) = guess_profile(marked, Profile(likely=True), machine.sensors).missing
     assert '--pulses "Ch5 KPH"' in asked
+    with pytest.raises(RecordError, match="'likely' finds pairs for 1 of 2 planes; say which"):
+        record_of(recording("CH1", "CH2", "CH3"), machine.sensors, profile=Profile(likely=True))
 
 
 def test_what_a_profile_writes_serves_look_with_and_without_the_machine(machine, tmp_path):
