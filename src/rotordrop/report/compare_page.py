@@ -146,7 +146,11 @@ def _verdict(
         else:
             text = "not every drop states an interval, so their order does not say which was the worst."
         texts.setdefault((text, "notice" if sure else "warning"), []).append(f"{bearing} {number.label}")
-    said += [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in texts.items()]
+    open_ones = [f"{', '.join(of)}: {text}" for (text, level), of in texts.items() if level == "warning"]
+    said += [
+        Statement(f"{', '.join(of)}: {text}") for (text, level), of in texts.items() if level == "notice"
+    ]
+    said += [Statement(" ".join(open_ones), "warning")] if open_ones else []
     of_drops: dict[str, list[str]] = {}
     for one in drops:
         for text in one.drop.warnings:

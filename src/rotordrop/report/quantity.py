@@ -245,18 +245,18 @@ _UNITS = {unit for scales in (DISPLAY, IN_OTHER_UNITS) for _, unit in scales.val
 _NUMBER_AND_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) ("
     + "|".join(re.escape(unit) for unit in sorted(_UNITS | {"rpm"}, key=len, reverse=True) if unit)
-    + r")(?![\w/])|(?<=±) (?=\d)"
+    + r")(?![\w/])|(?<=±) (?=\d)|(?<=\()[\d.−\u202f]+ to (?=[\d.−])"
 )
 
 
 def unbroken(text: str) -> str:
-    r"""The text with no-break spaces between a number and its unit, and after ±.
+    r"""The text with no-break spaces between a number and its unit, after ±, and in an interval in brackets.
 
     Examples
     --------
     >>> from rotordrop.report.quantity import unbroken
-    >>> unbroken("9 to 50 % at 3 N s/m").split(" ")
-    ['9', 'to', '50\xa0%', 'at', '3\xa0N\xa0s/m']
+    >>> unbroken("9 to 50 % at 3 N s/m (2 to 4 N s/m)").split(" ")
+    ['9', 'to', '50\xa0%', 'at', '3\xa0N\xa0s/m', '(2\xa0to\xa04\xa0N\xa0s/m)']
     """
     return _NUMBER_AND_UNIT.sub(lambda found: found[0].replace(" ", NO_BREAK), text)
 
