@@ -251,13 +251,6 @@ def test_several_records_give_machine_and_drops(calibrated, tmp_path, capsys):
     assert sorted(f.name for f in tmp_path.glob("*.html")) == ["page_drop_060.html", "page_second.html"]
 
 
-def test_a_stopped_calibration_leaves_no_file(interrupted, tmp_path, capsys):
-    output = tmp_path / "calibrated.toml"
-    assert run(["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]) == INTERRUPTED
-    assert "stopped; nothing was left half written" in words(capsys.readouterr().err)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_an_estimate_stopped_at_a_warning_leaves_an_earlier_one_alone(interrupted, tmp_path, caplog):
     """What the gate warns of is told before the fit, which such a record makes long."""
     earlier, faulty = tmp_path / "estimate.json", another_drop(tmp_path)

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from tests.published import bearing, published, value
 
-from rotordrop import example_record_path, save_machine
+from rotordrop import save_machine
 from rotordrop.cli import app
 from rotordrop.cli._output import FILLED, OUTPUTS
 from rotordrop.cli._terminal import printable
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
-from rotordrop.files import write_json
 from rotordrop.machine import example_machine, example_path
 
 
@@ -125,68 +123,6 @@ def test_a_place_that_takes_no_file_is_said_before_anything_is_read(
     finally:
         monkeypatch.undo()
     assert words in _told(capsys)
-
-
-@pytest.fixture(scope="module")
-def things(tmp_path_factory):
-    """A folder with what the commands read."""
-    folder = tmp_path_factory.mktemp("things")
-    save_machine(example_machine("small"), folder / "small.toml")
-    turning = {"speed.aero_linear": 0.1, "speed.aero_quadratic": 0.0}
-    save_machine(example_machine("lp400").with_values(turning), folder / "m.toml")
-    shutil.copy(example_record_path("lp400_drop_060"), folder / "r.h5")
-    (folder / "s.toml").write_text(
-        'machine = "m.toml"\ndrops = 2\nduration = "2 ms"\nreduction = "quick"\n'
-        'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
-    )
-    small = example_machine("small").name
-    for name, force, machine in (("a", 3300.0, "m"), ("b", 2000.0, "m"), ("small", 900.0, small)):
-        peaks = {"DE": bearing({"peak_force_N": value(force), "peak_stress_Pa": value(1.5e9)})}
-        drop = published(record=name, record_sha256=name * 64, machine=machine, bearings=peaks)
-        write_json(folder / f"{name}.json", drop.as_json(), sealed=True)
-    assert run(["log", "add", str(folder / "log.db"), str(folder / "a.json")]) == 0
-    assert run(["study", "run", str(folder / "s.toml"), "--folder", str(folder / "study")]) == 0
-    return folder
-
-
-CALLS = {
-    "look": "look r.h5 m.toml",
-    "profile": "profile r.h5",
-    "waterfall": "waterfall m.toml r.h5 --points 512",
-    "restart": "restart small.toml small.json --drops 0",
-    "compare": "compare a.json b.json",
-    "log": "log show log.db",
-    "study run": "study run s.toml --folder study",
-    "study show": "study show study",
-    "simulate": "simulate m.toml --speed 60Hz --duration 2ms --reduction quick",
-    "coast-down": "coast-down m.toml --speed 0.16Hz --until 0.6s --reduction quick",
-    "critical-speeds": "critical-speeds small.toml",
-    "check": "check small.toml",
-    "bearings": "bearings 7016 ACD/HCP4A",
-    "convert": "convert small.toml --to ross",
-    "doctor": "doctor",
-}
-"""Commands that end soon with what they write."""
-LONG = {"clearance", "estimate", "calibrate", "study repeat"}
-"""Commands that compute for long: study `interruptions` calls them with a full disk, and what they
-write is written by functions that `test_written_files` gives one."""
-
-
-def test_every_command_that_writes_is_called_with_a_full_disk_or_computes_for_long():
-    assert {verb.values[0].name for verb in WRITTEN} == set(CALLS) | LONG
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-@pytest.mark.parametrize(("verb", "option"), [one for one in WRITTEN if one.values[0].name in CALLS])
-def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, capsys):
-    suffix = {"output": ".h5"}.get(option, ".json")
-    file = tmp_path / f"o{suffix}"
-    file.symlink_to("/dev/full")
-    monkeypatch.chdir(things)
-    (parameter,) = (one for one in verb.load().params if one.name == option)
-    assert run([*CALLS[verb.name].split(), parameter.opts[0], str(file)]) == 6
-    assert "No space left on device" in _told(capsys)
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,13 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import __version__, load_result, save_machine
-from rotordrop.cli.app import INTERRUPTED, run
+from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.examples import example_record_path
 from rotordrop.files import digest_of_file
@@ -105,20 +104,3 @@ def test_where_a_magnet_stays_on_nothing_falls(capsys):
     assert run([*SHORT, "--levitated", "--stays-on", "NDE", "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)["bearings"]
     assert found["NDE"]["peak_force_N"]["value"] == pytest.approx(0.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("option", "file"), [("--json", "drop.json"), ("--report", "drop.html"), ("-o", "drop.h5")]
-)
-def test_ctrl_c_while_a_file_is_written_leaves_the_earlier_one(option, file, tmp_path, monkeypatch, capsys):
-    """The key is pressed when the temporary file is complete and not yet in its place."""
-
-    def pressed(self, target):
-        assert self.stat().st_size > 100
-        raise KeyboardInterrupt
-
-    (tmp_path / file).write_text("earlier")
-    monkeypatch.setattr(Path, "replace", pressed)
-    assert run([*SHORT, "--duration", "2 ms", option, str(tmp_path / file)]) == INTERRUPTED
-    assert "stopped; nothing was left half written" in " ".join(capsys.readouterr().err.split())
-    assert [(found.name, found.read_text()) for found in tmp_path.iterdir()] == [(file, "earlier")]
