@@ -62,13 +62,13 @@ def without_pairs(channels: Sequence[Channel]) -> tuple[list[Channel], list[str]
     half = len(channels[0].values) // 2
     if half < FEWEST_PAIRS or any(len(one.values) != len(channels[0].values) for one in channels):
         return list(channels), []
-    first, second = (np.stack([one.values[k : 2 * half : 2] for one in channels]) for k in (0, 1))
+    first, second = ([one.values[k : 2 * half : 2] for one in channels] for k in (0, 1))
     times = channels[0].time[: 2 * half].reshape(half, 2)
     for low, high in ((first, second), (second, first)):
-        back = np.mean(high[:, :-1] > low[:, 1:], axis=1) > ZIGZAG
-        if not np.any(low > high) and np.all(
-            back if times[0, 0] < times[0, 1] else times[:, 0] == times[:, 1]
-        ):
+        if any(np.any(a > b) for a, b in zip(low, high, strict=True)):
+            continue
+        back = [np.mean(b[:-1] > a[1:]) > ZIGZAG for a, b in zip(low, high, strict=True)]
+        if np.all(back if times[0, 0] < times[0, 1] else times[:, 0] == times[:, 1]):
             middles = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
             pairs = zip(channels, middles, strict=True)
             words = "the readings are pairs, the least and the greatest of an interval (peak detection)"
@@ -85,12 +85,11 @@ def mended(
     Gives both with the readings that nobody made, (N, S), which are bridged or NaN, and words on it.
     """
     words: list[str] = []
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    if len(time) > 2 and usual > 0.0 and np.any(np.abs(steps - usual) > WHOLE * usual):
-        time, signals, words = _at_one_rate(time, signals, steps, usual)
-    as_read = time, signals
-    time, signals = _with_lost(time, signals)
+    usual, as_read = float(np.median(np.diff(time))), (time, signals)
+    if len(time) > 2 and usual > 0.0 and np.any(np.abs(np.diff(time) - usual) > WHOLE * usual):
+        time, signals, words = _at_one_rate(time, signals, np.diff(time), usual)
+        as_read = time, signals
+        time, signals = _with_lost(time, signals)
     missing = ~np.isfinite(signals)
     most = int(SHORT / usual + 1e-6) if usual > 0.0 else 0
     most = max(most, 1) if len(time) == len(as_read[0]) else most  # one lost row of a slow clock shows in it

@@ -2,8 +2,8 @@
 
 Libraries that read HDF5, MAT, TDMS and Excel files end the interpreter, loop for ever or ask for all memory
 when a file is damaged in the wrong place. So one child process per file reads it, under limits on time and
-memory that grow with the size of the file, and hands the stored samples back over a pipe. It imports numpy,
-the one library and nothing else that is heavy.
+memory that grow with the size of the file, and hands the stored samples back in a file without a name. It
+imports numpy, the one library and nothing else that is heavy.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,29 +62,32 @@ class Content:
 def unpack(path: Path, kind: str) -> Content:
     """Read a file in a child process by `unpacked` of the module `kind` of `rotordrop.record.readers`."""
     import subprocess
+    from tempfile import TemporaryFile
 
     size = path.stat().st_size
     cpu = CPU_S + CPU_S_PER_BYTE * size
     order = {"path": str(path), "kind": kind, "cpu_s": cpu, "memory": MEMORY + MEMORY_PER_BYTE * size}
-    try:
-        done = subprocess.run(
-            child_command(__name__, "child", order),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=PATIENCE * cpu,
-            env=os.environ | ENVIRONMENT | {"HDF5_USE_FILE_LOCKING": "FALSE"},
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise _too_long(path, PATIENCE * cpu) from None
-    code = done.returncode
-    if os.name == "posix" and code in (-signal.SIGXCPU, -signal.SIGKILL):
-        raise _too_long(path, cpu)
-    if code != 0:
-        what = f"signal {-code}" if code < 0 else f"code {code}"
-        raise damaged(path, f" cannot be read: the library for this format was ended by {what}")
-    return _content(done.stdout, path)
+    with TemporaryFile() as answer:  # of a pipe all would be in memory twice, and lie there in pieces
+        try:
+            done = subprocess.run(
+                child_command(__name__, "child", order),
+                stdin=subprocess.DEVNULL,
+                stdout=answer,
+                stderr=subprocess.DEVNULL,
+                timeout=PATIENCE * cpu,
+                env=os.environ | ENVIRONMENT | {"HDF5_USE_FILE_LOCKING": "FALSE"},
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise _too_long(path, PATIENCE * cpu) from None
+        code = done.returncode
+        if os.name == "posix" and code in (-signal.SIGXCPU, -signal.SIGKILL):
+            raise _too_long(path, cpu)
+        if code != 0:
+            what = f"signal {-code}" if code < 0 else f"code {code}"
+            raise damaged(path, f" cannot be read: the library for this format was ended by {what}")
+        answer.seek(0)
+        return _content(answer, path)
 
 
 def _too_long(path: Path, limit: float) -> RecordError:
@@ -92,22 +95,20 @@ def _too_long(path: Path, limit: float) -> RecordError:
     return damaged(path, words)
 
 
-def _content(answer: bytes, path: Path) -> Content:
+def _content(answer: IO[bytes], path: Path) -> Content:
     """What the child wrote: a head in JSON on one line, then the samples of every array."""
-    line, _, _ = answer.partition(b"\n")
-    head = json.loads(line)
+    head = json.loads(answer.readline())
     if "refused" in head:
         raise RecordError(head["refused"])
     if "missing" in head:
         lacks = f"{path}: reading {path.suffix} files needs the package {head['missing']}"
         raise RecordError(f"{lacks}; install it with pip install 'rotordrop[io]'")
-    items, at = [], len(line) + 1
+    items = []
     for entry in head["items"]:
         kind, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
-        count = int(np.prod(shape, dtype=np.int64))
-        values = np.frombuffer(answer, dtype=kind, count=count, offset=at).reshape(shape)
+        samples = answer.read(int(np.prod(shape, dtype=np.int64)) * kind.itemsize)
+        values = np.frombuffer(samples, dtype=kind).reshape(shape)
         items.append(Item(name=entry["name"], values=values, attributes=entry["attributes"]))
-        at += count * kind.itemsize
     return Content(items=tuple(items), attributes=head["attributes"])
 
 

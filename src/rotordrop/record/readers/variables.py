@@ -221,12 +221,10 @@ class Variables:
     def _values(self, item: Item) -> Array:
         """Readings: stored × factor + offset, NaN where the file has its value for none."""
         factor, offset = self._factor(item)
-        values = item.values.astype(np.float64)
+        values = item.values.astype(np.float64, copy=False)
         for _, none in self._said(item, "none"):
-            values[item.values == none] = np.nan
-        values *= factor
-        values += offset
-        return values
+            values = np.where(item.values == none, np.nan, values)
+        return values if (factor, offset) == (1.0, 0.0) else values * factor + offset
 
     def _factor(self, item: Item) -> tuple[float, float]:
         """What one count is worth and where it is zero, by the attributes of the array or its structure."""
