@@ -236,18 +236,14 @@ def waterfall(
     from rotordrop.estimate.coast_down import waterfall as analyse
     from rotordrop.machine import load_machine
     from rotordrop.record.record import Record, read_record
-    from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
-    from rotordrop.report.origin import machine_facts
-    from rotordrop.report.waterfall_page import waterfall_page
     from rotordrop.simulate.coast_down_file import is_coast_down
     from rotordrop.spectrum.coast_down import WaterfallChoice, write_findings
 
     machine, record = options.machine_first(machine, record)
-    described, simulated = load_machine(machine), SIMULATED_MACHINE
+    described = load_machine(machine)
     read: Path | Record = record
     if not is_coast_down(record):
         read = read_record(record, described, profile=profile, mapping=mapping or ())
-        simulated = SIMULATED_RECORD if read.is_simulated else ""
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
@@ -257,6 +253,12 @@ def waterfall(
         found = analyse(described, read, choice, progress=progress)
     if against is Against.speed and found.signal.profile is None:
         raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
+    from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
+    from rotordrop.report.origin import machine_facts
+    from rotordrop.report.waterfall_page import waterfall_page
+
+    said = SIMULATED_RECORD if isinstance(read, Record) else SIMULATED_MACHINE
+    simulated = "" if isinstance(read, Record) and not read.is_simulated else said
     page = waterfall_page(
         found,
         title=f"Frequencies of a coast-down of {described.name}",

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.special import ellipk
+import scipy
 
 from rotordrop.arrays import Array
 
@@ -64,4 +64,4 @@ def period_ratio(amplitude: ArrayLike) -> Any:
 
     Exact for amplitudes below π. Source: Beléndez et al., cited in Neisi 2020, section 5.4.
     """
-    return 2.0 / math.pi * ellipk(np.sin(0.5 * np.asarray(amplitude)) ** 2)
+    return 2.0 / math.pi * scipy.special.ellipk(np.sin(0.5 * np.asarray(amplitude)) ** 2)

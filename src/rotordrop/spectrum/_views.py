@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array, ComplexArray, Mask
 from rotordrop.spectrum.candidates import LineKind
@@ -87,10 +87,10 @@ def _share_inside(count: int, size: int) -> Array:
 
 def _thinned(rows: Array, factor: int) -> Array:
     half = TAPS_PER_FACTOR // 2
-    taps = firwin(2 * half * factor + 1, 1.0 / factor, window=("kaiser", 0.1102 * (STOP_BAND - 8.7)))
-    return cast(
-        Array, upfirdn(taps, rows, 1, factor, axis=-1)[..., half : half - (-rows.shape[-1] // factor)]
-    )
+    window = ("kaiser", 0.1102 * (STOP_BAND - 8.7))
+    taps = scipy.signal.firwin(2 * half * factor + 1, 1.0 / factor, window=window)
+    last = half - (-rows.shape[-1] // factor)
+    return cast(Array, scipy.signal.upfirdn(taps, rows, 1, factor, axis=-1)[..., half:last])
 
 
 @lru_cache(maxsize=8)

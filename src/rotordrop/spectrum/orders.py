@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import label
-from scipy.signal import find_peaks, peak_widths
 
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.document import stated
@@ -405,12 +405,12 @@ def _curve(track: OrderTrack, column: int, order: float) -> _Curve | None:
 
 def _peaks(curve: _Curve) -> list[_Rise]:
     amplitude = curve.amplitude
-    peaks, facts = find_peaks(amplitude, prominence=1e-12, plateau_size=1)
+    peaks, facts = scipy.signal.find_peaks(amplitude, prominence=1e-12, plateau_size=1)
     base = amplitude[peaks] - facts["prominences"]
     clear = amplitude[peaks] >= LEAST_RISE * base
     noise = [curve.error[first : last + 1].max() for first, last in _edges(facts)]
     clear &= facts["prominences"] >= 5.0 * np.asarray(noise, dtype=np.float64)
-    _, _, left, right = peak_widths(amplitude, peaks[clear], rel_height=0.5)
+    _, _, left, right = scipy.signal.peak_widths(amplitude, peaks[clear], rel_height=0.5)
     edges = [edge for edge, good in zip(_edges(facts), clear, strict=True) if good]
     return [
         _Rise(int(at), *edge, float(low), float(start), float(end))

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
-from scipy.optimize import least_squares
-from scipy.special import ndtr
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
@@ -68,8 +66,8 @@ class SpeedProfile:
     """Standard deviation of the recorded speed about the profile [rad/s]; 0 for an exact speed."""
     rejected: int
     """Recorded values left out as outliers [1]."""
-    _curve: PPoly
-    _angle: PPoly
+    _curve: scipy.interpolate.PPoly
+    _angle: scipy.interpolate.PPoly
 
     def speed_at(self, time: ArrayLike) -> Array:
         """Rotor speed [rad/s] at times [s]; constant beyond the ends of the profile."""
@@ -137,7 +135,7 @@ def fit_speed_profile(time: ArrayLike, speed: ArrayLike, *, power_off: float | N
 
 
 def _profile(time: Array, speed: Array, *, noise: float, rejected: int) -> SpeedProfile:
-    curve = CubicSpline(time, speed)
+    curve = scipy.interpolate.CubicSpline(time, speed)
     return SpeedProfile(
         time=time, speed=speed, noise=noise, rejected=rejected, _curve=curve, _angle=curve.antiderivative()
     )
@@ -171,7 +169,7 @@ def _block_means(log_time: Array, speed: Array) -> tuple[Array, Array, Array]:
     return np.add.reduceat(log_time, first) / count, np.add.reduceat(speed, first) / count, count
 
 
-def _smooth_without_outliers(log_time: Array, speed: Array) -> tuple[CubicSpline, float, int]:
+def _smooth_without_outliers(log_time: Array, speed: Array) -> tuple[Model, float, int]:
     # A first look through a running median keeps one missing or double tacho pulse from bending the curve.
     padded = np.pad(speed, 2, mode="edge")
     median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
@@ -181,7 +179,7 @@ def _smooth_without_outliers(log_time: Array, speed: Array) -> tuple[CubicSpline
     keep = np.abs(speed - median) <= OUTLIER * max(_spread((speed - median)[turning]), least)
     for _ in range(2):
         place, mean, count = _block_means(log_time[keep], speed[keep])
-        smooth = make_smoothing_spline(place, mean, w=count)
+        smooth = scipy.interpolate.make_smoothing_spline(place, mean, w=count)
         residual = speed - smooth(log_time)
         spread = _spread(residual[keep & turning])
         before, keep = keep, np.abs(residual) <= OUTLIER * max(spread, least)
@@ -405,7 +403,7 @@ def _fit(
 ) -> tuple[Array, Array]:
     """Least squares in scaled parameters, with errors from the residual and its run of equal signs."""
     bounds = lower / scale, upper / scale
-    solution = least_squares(
+    solution = scipy.optimize.least_squares(
         lambda q: model(q * scale) - measured,
         np.clip(np.ones(scale.size), *bounds),
         bounds=bounds,
@@ -457,7 +455,7 @@ def _reading(time: Array, speed: Array) -> Model:
     def mean_reading(omega: Array) -> Array:
         z = omega / noise
         density = np.exp(-0.5 * z**2) / math.sqrt(2.0 * math.pi)
-        return cast(Array, omega * ndtr(z) + noise * density)
+        return cast(Array, omega * scipy.special.ndtr(z) + noise * density)
 
     return mean_reading
 

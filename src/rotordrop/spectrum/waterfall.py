@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import fft, next_fast_len, rfft
 from scipy.ndimage import map_coordinates, spline_filter1d
-from scipy.signal import firwin, resample_poly, upfirdn
 
 from rotordrop.arrays import Array, Mask
 from rotordrop.errors import RecordError
@@ -232,13 +232,14 @@ def reduce_rate(
         return np.asarray(displacement[0 : displacement.shape[0]], dtype=np.float64), sampling_rate
     beta = 0.1102 * (STOP_BAND - 8.7)
     half = TAPS_PER_FACTOR // 2
-    taps = firwin(2 * half * factor + 1, PASSED / factor, window=("kaiser", beta))
+    taps = scipy.signal.firwin(2 * half * factor + 1, PASSED / factor, window=("kaiser", beta))
     samples = displacement.shape[0]
     thin = np.empty((-(-samples // factor), displacement.shape[1]))
     for first in range(0, len(thin), BLOCK):
         last = min(first + BLOCK, len(thin))
         read = _extended(displacement, (first - half) * factor, (last - 1 + half) * factor + 1)
-        thin[first:last] = upfirdn(taps, read, 1, factor, axis=0)[2 * half : 2 * half + last - first]
+        inside = slice(2 * half, 2 * half + last - first)
+        thin[first:last] = scipy.signal.upfirdn(taps, read, 1, factor, axis=0)[inside]
     return thin, sampling_rate / factor
 
 
@@ -328,7 +329,8 @@ def order_power(
     starts = np.arange(float(angle[0]), end - turns, turns / 2)
     if starts.size == 0:
         return None
-    fine = spline_filter1d(resample_poly(signal.T, UPSAMPLING, 1, axis=1, padtype="line"), SPLINE_DEGREE)
+    finer = scipy.signal.resample_poly(signal.T, UPSAMPLING, 1, axis=1, padtype="line")
+    fine = spline_filter1d(finer, SPLINE_DEGREE)
     coordinate = np.arange(int(highest_order * turns) + 1) / turns
     power = np.full((starts.size, coordinate.size, signal.shape[1]), np.nan)
     middle, steps = np.empty(starts.size), np.arange(float(len(angle)))
