@@ -38,7 +38,7 @@ from rotordrop.one_thread import ENVIRONMENT
 BROKEN_PIPE = 141
 """Exit code when the reader has gone: 128 plus the number of the signal, the standard of shells."""
 
-_MMAP_THRESHOLD, _ARENA_MAX = -3, -8
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """Numbers of the options of mallopt(3)."""
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 
@@ -264,8 +264,8 @@ def _give_memory_back() -> None:
     """Have glibc return large arrays when they go: else it keeps what a fit once needed."""
     if sys.platform == "linux":
         with suppress(AttributeError):  # another C library
-            ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, 1 << 20)
-            ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
+            for option, value in ((_MMAP_THRESHOLD, 1 << 24), (_TRIM_THRESHOLD, 1 << 26), (_ARENA_MAX, 1)):
+                ctypes.CDLL(None).mallopt(option, value)
 
 
 def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
