@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rotordrop.arrays import Array
 
 SIGMA_OF_MEDIAN = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution [1]."""
@@ -14,6 +19,9 @@ DRAWN_BLOCKS = 900
 
 MANY = 1 << 18
 """Samples that show what many more show no better: noise, steps, how far a rotor strays (chosen)."""
+
+PART = 1 << 16
+"""Samples of a long record that are worked on at a time (chosen)."""
 
 
 def stride_of(count: int) -> int:
@@ -35,6 +43,16 @@ def closed(mask: NDArray[np.bool_], gap: int) -> NDArray[np.bool_]:
         if begin - end < gap:
             filled[end:begin] = True
     return filled
+
+
+def in_parts(function: Callable[..., Array], values: Array, *arguments: Any, beside: int = 0) -> Array:
+    """One number for each sample of a series (N, ...), shape (N,), in parts with so many neighbours."""
+    found = np.empty(len(values))
+    for first in range(0, len(values), PART):
+        early = max(first - beside, 0)
+        part = function(values[early : first + PART + beside], *arguments)
+        found[first : first + PART] = part[first - early :][:PART]
+    return found
 
 
 def median_of_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,20 +120,12 @@ def peak_indices(*signals: NDArray[np.float64], blocks: int = DRAWN_BLOCKS) -> N
     if count <= 2 * blocks * len(signals):
         return np.arange(count, dtype=np.int64)
     edges = np.linspace(0, count, blocks + 1).astype(np.int64)
-    chosen: list[NDArray[np.int64]] = [np.array([0, count - 1], dtype=np.int64)]
+    chosen = [0, count - 1]
     for signal in signals:
-        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, signal), edges))
-        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, -signal), edges))
-    return np.unique(np.concatenate(chosen))
-
-
-def block_extremes(values: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Index of the first smallest value of every block between two edges; no block is empty."""
-    width = int(np.max(np.diff(edges)))
-    index = edges[:-1, None] + np.arange(width)
-    inside = index < edges[1:, None]
-    block = np.where(inside, values[np.minimum(index, len(values) - 1)], np.inf)
-    return np.asarray(edges[:-1] + np.argmin(block, axis=1), dtype=np.int64)
+        for values in (signal, -signal):
+            known = np.where(np.isnan(values), np.inf, values)
+            chosen += [first + int(np.argmin(known[first:last])) for first, last in pairwise(edges.tolist())]
+    return np.unique(np.array(chosen, dtype=np.int64))
 
 
 def refined_peak(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float]:

@@ -5,7 +5,6 @@ Of a recorded one: power-off, centre, planes, speed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -19,7 +18,6 @@ from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
 from rotordrop.evidence.given import require_drop
-from rotordrop.evidence.impacts import Settling
 from rotordrop.evidence.one_end import with_zeros
 from rotordrop.evidence.paths import Drop, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
@@ -128,6 +126,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
             centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
     # A speed given by hand says from where the rotor fell, not how it slowed down.
     measured = record.measured_speed
+    nearest = sorted(falls, key=lambda one: abs(one.release - off))[:1]
     time, speed = (None, None) if measured is None else (measured[0] - off, measured[1])
     return CoastDownSignal(
         planes={
@@ -137,7 +136,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         air_gap=dict(zip(names, map(float, gaps), strict=True)),
         air_gap_error=None if sigmas is None else dict(zip(names, map(float, sigmas), strict=True)),
         centre=centre,
-        settling=_settlings(walls, falls, off),
+        settling={n: s.after(off) for fall in nearest for n, s in zip(walls, fall.settlings, strict=True)},
         sampling_rate=record.sampling_rate,
         start_time=float(record.time[first]) - off,
         profile=None if time is None or speed is None else fit_speed_profile(time, speed, power_off=0.0),
@@ -153,14 +152,6 @@ def _seen(record: Record, machine: Machine) -> tuple[dict[str, Wall], tuple[Drop
     if isinstance(motion, Missing):
         return {}, ()
     return motion.walls, tuple(with_impacts(motion, fall) for fall in drops_of(motion))
-
-
-def _settlings(walls: Iterable[str], falls: tuple[Drop, ...], off: float) -> dict[str, Settling]:
-    """Impacts of the fall after power-off [s] by plane."""
-    if not falls:
-        return {}
-    fall = min(falls, key=lambda one: abs(one.release - off))
-    return {name: settling.after(off) for name, settling in zip(walls, fall.settlings, strict=True)}
 
 
 def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.known import NINETY
+from rotordrop.series import in_parts
 from rotordrop.units import GRAVITY, fall_time
 
 SMOOTHING = 1e-3
@@ -101,7 +102,7 @@ def find_impacts(
     fall is one.
     """
     radius = np.hypot(*path.T)
-    speed = slope(radius, rate)
+    speed = in_parts(slope, radius, rate, beside=int(SMOOTHING * rate) + 1)
     turns = _turns_of(radius, speed, rate, gap, noise)
     contact = _Contact.of(turns)
     found: list[tuple[_Turn, float, float]] = []

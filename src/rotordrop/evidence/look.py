@@ -597,8 +597,8 @@ def _largest_between(path: Path, at: int, count: int) -> tuple[float, float]:
     The largest of noisy readings lies above the largest distance by what the largest noise is at most.
     """
     here = float(path.radius[at])
-    aside = float(np.hypot(*path.bearing_position[at])) - here
-    outward = float(np.hypot(*(path.bearing_position[at] - path.position[at])))
+    aside = float(np.hypot(*path.at_race(at))) - here
+    outward = float(np.hypot(*(path.at_race(at) - path.position[at])))
     beside = LEVER_DOUBT / max(abs(path.wall.lever), LEVER_DOUBT) * outward
     half = NINETY * math.hypot(path.wall.centre_error.max(), GAIN * here, beside)
     below = math.hypot(half, path.noise * math.sqrt(2.0 * math.log(count / 0.05)))

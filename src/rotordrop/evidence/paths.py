@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import FOLLOWED_TURNS, WhirlSpell, whirl_spells
 from rotordrop.record.record import Record
-from rotordrop.series import MANY, noise_by_differences, running_mean, runs_of, stride_of
+from rotordrop.series import MANY, in_parts, noise_by_differences, running_mean, runs_of, stride_of
 from rotordrop.units import GRAVITY, fall_time
 
 SLOWEST_FALL = 0.2
@@ -61,14 +61,16 @@ class Path:
     """Displacement from the centre of the clearance circle [m], y up, shape (N, 2)."""
     levitated: Array
     """Mean levitated position [m], shape (2,)."""
-    bearing_position: Array
-    """The same at the touchdown bearing, a little outside the sensors, the shaft taken as straight [m]."""
     wall: Wall
     """The clearance circle, with what the record leaves open; its centre is that of `position`."""
     noise: float
     """Standard deviation of the readings beside their motion [m]."""
     at_bearing: bool = True
     """Whether no other plane is nearer to its touchdown bearing; else the path meets no race."""
+    turn: Array = field(default_factory=lambda: np.eye(2))
+    """From the axes of the record to those of the path, shape (2, 2)."""
+    opposite: Path | None = None
+    """The path at the other end."""
 
     @property
     def gap(self) -> float:
@@ -84,6 +86,18 @@ class Path:
     def radius(self) -> Array:
         """Distance from the centre [m], shape (N,)."""
         return np.hypot(self.position[:, 0], self.position[:, 1])
+
+    def at_race(self, part: slice | int | NDArray[np.int64]) -> Array:
+        """Position at the touchdown bearing, a little outside the sensors, if the shaft is straight [m]."""
+        if self.opposite is None:
+            return np.asarray(self.position[part])
+        place = self.opposite.levitated - self.opposite.position[part]
+        _turn(place, self.turn @ self.opposite.turn.T)
+        place += self.position[part]
+        place -= self.levitated
+        place *= self.wall.lever
+        place += self.position[part]
+        return place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,38 +154,33 @@ def motion_of(
     rest = np.median(raw[rest_from::stride], axis=0)
     near = set(range(raw.shape[1])) if machine is None else planes_at_bearings(machine, record)
     paths: list[Path] = []
-    turns = []
+    opposite = []
     for number, plane in enumerate(record.planes):
         position, floated = raw[:, number], np.mean(raw[:begin, number], axis=0)
         # the plane at the other end is the one that moves most unlike this
         thin = raw[::stride].swapaxes(0, 1)
         unlike = [float(np.hypot(*np.std(place - thin[number], axis=0))) for place in thin]
-        other = raw[:, int(np.argmax(unlike))]
-        wall = find_wall(position, other, rate, (begin, sunk), gaps[number])
-        apart = position - floated - other + np.mean(other[:begin], axis=0)
-        apart *= wall.lever
+        opposite.append(int(np.argmax(unlike)))
+        wall = find_wall(position, raw[:, opposite[-1]], rate, (begin, sunk), gaps[number])
         turn = np.eye(2) if angles_known else _upright(position[:begin][-MANY:], rest[number] - floated)
-        turns.append(turn)
-        _turn(apart, turn)
         paths.append(
             Path(
                 name=plane.bearing if number in near else ", ".join(plane.names),
                 at_bearing=number in near,
                 position=position,
-                bearing_position=apart,
                 levitated=turn @ (floated - wall.centre),
+                turn=turn,
                 wall=wall,
-                noise=_noise(position),
+                noise=noise_by_differences(position[:MANY], 3),
             )
         )
-    for number, (path, turn) in enumerate(zip(paths, turns, strict=True)):
-        # in place: copies of a minute would fill a gigabyte
-        position, wall = path.position, path.wall
-        position -= wall.centre
-        _turn(position, turn)
-        np.add(path.bearing_position, position, out=path.bearing_position)
-        radius = np.hypot(*path.bearing_position.T)
-        if wall.touch is None or wall.touch.at(radius[:, None])[0] > (1.0 + BEYOND) * wall.gap:
+    for path in paths:  # in place: copies of a minute would fill a gigabyte
+        np.subtract(path.position, path.wall.centre, out=path.position)
+        _turn(path.position, path.turn)
+    for number, (path, other) in enumerate(zip(paths.copy(), opposite, strict=True)):
+        path = replace(path, opposite=paths[other])
+        wall, radius = path.wall, np.hypot(*path.at_race(slice(None)).T)
+        if wall.touch is None or wall.touch.when(radius) > (1.0 + BEYOND) * wall.gap:
             wall = replace(wall, touch=crossing(radius, begin, rate, wall.gap, wall.gap_error))
         paths[number] = replace(path, wall=wall)
     sought = [path for path, given in zip(paths, gaps, strict=True) if given is None and path.at_bearing]
@@ -204,15 +213,13 @@ def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
             lever=0.0,
             touch=None,
         )
-        away = position - usual
         paths.append(
             Path(
                 name=plane.bearing,
-                position=away,
+                position=position - usual,
                 levitated=np.zeros(2),
-                bearing_position=away,
                 wall=wall,
-                noise=_noise(position),
+                noise=noise_by_differences(position[:MANY], 3),
             )
         )
     return Motion(
@@ -232,9 +239,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     """
     first = max(int(0.01 * rate), 8)
     raw = _calmed(raw, rate)
-    away = np.column_stack(
-        [np.hypot(*(path - np.mean(path[:first], axis=0)).T) for path in raw.swapaxes(0, 1)]
-    )
+    away = np.column_stack([_distance(path, np.mean(path[:first], axis=0)) for path in raw.swapaxes(0, 1)])
     reach = np.percentile(away, 98, axis=0)
     usual = np.max(away[:first], axis=0)
     still = bool(np.any(reach < 4.0 * usual))
@@ -286,6 +291,12 @@ def _calmed(path: Array, rate: float) -> Array:
     return mean
 
 
+def _distance(path: Array, place: Array, rate: float | None = None) -> Array:
+    """Distance of a path (N, 2), or with a rate of its running mean, from a place [m], shape (N,)."""
+    away = (path if rate is None else _calmed(path, rate)) - place
+    return np.hypot(away[:, 0], away[:, 1])
+
+
 def _turn(path: Array, turn: Array) -> None:
     """Turn the axes of a path (N, 2), in place and part by part: NumPy is slow on a long one."""
     for part in np.array_split(path, 1 + len(path) // MANY):
@@ -301,17 +312,12 @@ def _upright(levitated: Array, fall: Array) -> Array:
     return turn if swept >= 0 else np.diag([-1.0, 1.0]) @ turn
 
 
-def _noise(position: Array) -> float:
-    """Scatter of neighbouring samples about the parabola through them [m]."""
-    return noise_by_differences(position[:MANY], 3)
-
-
 def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
     """Samples at which all planes stay near where they floated for longer than any flight between impacts."""
     near = np.ones(len(paths[0].position), dtype=np.bool_)
     for path in paths:
         size = max(0.5 * path.gap, 2.0 * float(np.hypot(*path.levitated)) if path.gap else 0.0)
-        away = np.hypot(*(_calmed(path.position, rate) - path.levitated).T)
+        away = in_parts(_distance, path.position, path.levitated, rate, beside=int(SMOOTHING * rate))
         near &= away < min(size, 0.7 * path.gap)
     flight = 4.0 * fall_time(max(path.gap for path in paths))
     for start, length in zip(*runs_of(near), strict=True):
@@ -478,7 +484,7 @@ def _release(motion: Motion, start: int, stop: int) -> tuple[float, tuple[float,
     held = int(np.searchsorted(time, release - _RELEASED))
     first = max(held - int(_ORBIT * motion.rate), 0)
     for path in motion.at_bearings if held > first else ():
-        away = np.hypot(*(path.position[first:stop] - path.levitated).T)
+        away = in_parts(_distance, path.position[first:stop], path.levitated)
         reach = _LEAVES * float(np.max(away[: held - first]))
         late.append(float(time[first + int(np.argmax(away > reach))]))
         early.append(late[-1] - fall_time(2.0 * reach))
@@ -493,23 +499,19 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
     time = motion.time[inside]
     impacts, settlings = [], []
     for path in motion.at_bearings:
-        place = path.bearing_position[inside]
-        hits = find_impacts(place, motion.rate, path.gap, path.noise)
+        hits = find_impacts(path.at_race(inside), motion.rate, path.gap, path.noise)
         touched, surely, perhaps = (time[at] for at in (hits.touched, hits.surely, hits.perhaps))
         begun = np.full(len(touched), BEGUN)
         touch, centre = path.wall.touch, NINETY * float(path.wall.centre_error.max())
-        if (
-            len(touched)
-            and touch is not None
-            and abs(touch.sample - first - hits.touched[0]) < 3e-3 * motion.rate
-        ):
+        near = 3e-3 * motion.rate
+        if len(touched) and touch is not None and abs(touch.sample - first - hits.touched[0]) < near:
             touched[0] = surely[0] = perhaps[0] = touch.when(motion.time)
             begun[0] = touch.error
-        for begins, error, at, approach, rebound in zip(
-            touched, begun, hits.deepest, hits.approach, hits.rebound, strict=True
-        ):
-            away = float(np.hypot(*place[at]))
-            half, azimuth, depth = NINETY * float(error), float(np.arctan2(*place[at][::-1])), away - path.gap
+        deepest = path.at_race(first + hits.deepest)
+        each = zip(touched, begun, deepest, hits.approach, hits.rebound, strict=True)
+        for begins, error, place, approach, rebound in each:
+            away = float(np.hypot(*place))
+            half, azimuth, depth = NINETY * float(error), float(np.arctan2(*place[::-1])), away - path.gap
             aside, doubt = centre / away, path.wall.distance_error
             impacts.append(
                 Impact(

@@ -218,7 +218,9 @@ def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
             f"{name}: {record.duration:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
             "needed for the air gap. Record longer after standstill."
         )
-    place = sensing.at_bearings(along - sensing.settled_bend)
+    level = along.mean(axis=0)
+    along -= sensing.settled_bend
+    place = sensing.at_bearings(along)
     sideways, height = place[..., 0].mean(axis=0), place[..., 1].mean(axis=0)
     # the arc is taken to be level where the rotor lies on average, and centred at the zero of the sensors
     place[..., 0] -= sideways
@@ -245,7 +247,7 @@ def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
         standard_error=of_few(means.std(axis=0, ddof=1) / np.sqrt(blocks), blocks - 1),
         sideways=sideways,
         sway=sway,
-        along=along.mean(axis=0) - raised,
+        along=level - raised,
         start=float(time[0]),
         end=float(time[-1]),
     )

@@ -81,7 +81,8 @@ class Touch:
 
     def when(self, values: Array) -> float:
         """One value of a series (N,) at the touch, such as the time."""
-        return float(np.interp(self.sample, np.arange(len(values)), values))
+        first = min(int(self.sample), len(values) - 2)
+        return float(np.interp(self.sample, (first, first + 1), values[first : first + 2]))
 
 
 def first_touch(
@@ -122,7 +123,12 @@ def first_touch(
         share = float(np.interp(begins, np.arange(len(way)), way)) / size
         if _FIRST_SOFT < share < _SURELY[1]:
             soft = Touch(sample=begins, error=_FLANK_ERROR * lasts / rate, by_kink=True)
-            if not _sets_in_at_once(place, begins, rate):
+            # whether a jump of the deceleration explains the motion better than its growth from a touch on
+            jump, growth = (
+                _dated(place, round(begins), rate, after=_SUDDEN_WITHIN, searched=(-0.8e-3, 0.6e-3), power=k)
+                for k in (2, 3)
+            )
+            if not jump[1] < _SUDDEN * growth[1]:
                 return soft
     far = _first_beyond(way, begin, _FARTHEST * size) or len(way) - 1
     last = min(far, near + int(_LATEST * rate))
@@ -208,15 +214,6 @@ def _departures(
     ]
     out = place[samples] - floated
     return samples, -np.sum(moved * out, axis=1) / np.maximum(np.hypot(*out.T), 1e-12), unit
-
-
-def _sets_in_at_once(place: Array, begins: float, rate: float) -> bool:
-    """Whether a jump of the deceleration explains the motion better than its growth from a touch on."""
-    at_once, grown = (
-        _dated(place, round(begins), rate, after=_SUDDEN_WITHIN, searched=(-0.8e-3, 0.6e-3), power=power)[1]
-        for power in (2, 3)
-    )
-    return at_once < _SUDDEN * grown
 
 
 def _dated(

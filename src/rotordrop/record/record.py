@@ -45,7 +45,7 @@ from rotordrop.record.readers.numpy_files import recording_of_arrays
 from rotordrop.record.recording import MARKS, SPEED_UNITS, Channel, Recording, spelled, split_unit, whose_time
 from rotordrop.record.tacho import passages, readings_of_held_signal
 from rotordrop.require import each, numbers, require
-from rotordrop.series import stride_of
+from rotordrop.series import PART, stride_of
 from rotordrop.sketch import sketch
 from rotordrop.units import FASTEST_SPIN, format_quantity, in_si, parse_quantity
 
@@ -55,8 +55,6 @@ SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 _TIME_UNITS = ("s", "ms", "us", "min")
 SLOWEST, FASTEST = 1e-3, 1e9
 """Sampling rates [Hz] beyond which a unit is mistyped (chosen)."""
-_PART = 65536
-"""Samples of a long record that are resolved at a time (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -304,8 +302,8 @@ class Record:
     def resolved(self) -> Array:
         """The same, made anew and not kept, part by part: copies of a minute would fill 150 MB."""
         motion = np.empty((len(self.planes), len(self.time), 2)).swapaxes(0, 1)  # each plane by itself
-        for begin in range(0, len(motion), _PART):
-            part = slice(begin, begin + _PART)
+        for begin in range(0, len(motion), PART):
+            part = slice(begin, begin + PART)
             motion[part] = planar_of(along_sensors(self.signals[part], self.sensors), self.planes)
         return motion
 
@@ -478,7 +476,8 @@ def record_of(
     even_time, signals, missing, said = mended(time, signals, [channel.label for channel in shared])
     time, rate = (time, rate) if np.array_equal(even_time, time) else even(even_time)
     words += said
-    signals.setflags(write=False)  # the record's own: not copied
+    for own in (time, signals):  # the record's own: not copied
+        own.setflags(write=False)
     notes += [doubt] if (doubt := event_of(recording.metadata)[1]) else []
     marks = next((c.values for c in recording.channels if c.name == MARKS and c.unit == "s"), None)
     when: Array | None = None

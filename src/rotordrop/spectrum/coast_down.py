@@ -23,7 +23,7 @@ from rotordrop.known import NINETY, Known
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress
 from rotordrop.require import each, require
-from rotordrop.series import noise_by_differences
+from rotordrop.series import in_parts, noise_by_differences
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.lines import MOST_LINES, Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, PassedResonance, find_resonances, track_orders, tracking_for
@@ -450,12 +450,10 @@ def _waterfalls(
     points = choice.points or points_for(moved.shape[0])
     if moved.shape[0] < points:
         return ()
-    speed = None
-    if signal.profile is not None:
-        speed = np.empty(moved.shape[0])
-        for begin in range(0, len(speed), points):  # a minute at once takes four times its own size
-            index = np.arange(begin, min(begin + points, len(speed)))
-            speed[index] = signal.profile.speed_at(signal.start_time + index / signal.sampling_rate)
+    speed, profile = None, signal.profile
+    if profile is not None:  # a minute at once takes four times its own size
+        time = signal.start_time + np.arange(moved.shape[0]) / signal.sampling_rate
+        speed = in_parts(profile.speed_at, time)
     return waterfalls(
         moved,
         signal.sampling_rate,
