@@ -58,8 +58,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         if not temporary.exists():
             raise OutputError(f"nothing was written for {target}")
-        _keep_permissions(target, temporary)
         _sync(temporary)
+        _keep_permissions(target, temporary)
         temporary.replace(target)
     except OSError as error:
         if error.filename not in (None, str(temporary), temporary):
@@ -390,7 +390,7 @@ def make_folder(folder: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)  # Windows syncs what it may write
     try:
         os.fsync(descriptor)
     finally:

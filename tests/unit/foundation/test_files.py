@@ -97,6 +97,12 @@ def test_text_is_utf_8_with_plain_line_ends_and_json_reads_back(tmp_path):
     assert json.loads((tmp_path / "t.json").read_text()) == {"bearings": {"NDE": {"value": 2.5e-4}}}
 
 
+def test_a_file_is_synced_through_what_may_write_it(tmp_path, monkeypatch):
+    """Windows asks for it."""
+    monkeypatch.setattr(os, "fsync", lambda fd: stat.S_ISREG(os.fstat(fd).st_mode) and os.write(fd, b""))
+    write_text(tmp_path / "t.txt", "280 µm\n")
+
+
 def test_an_error_about_another_file_is_not_renamed(tmp_path):
     with pytest.raises(FileNotFoundError, match="input"), atomic_path(tmp_path / "out.txt"):
         open(tmp_path / "input.csv")

@@ -239,15 +239,3 @@ class TestFilesThatEndTheLibrary:
                 file[f"series {number}"] = np.arange(3)
         with pytest.raises(RecordError, match=r"more than 2000 datasets"):
             read_recording(path, Profile())
-
-    def test_one_child_reads_a_small_file_fast(self, short, machine, tmp_path):
-        """Processor time of the child, start and imports included: wall time depends on who else runs."""
-        path = tmp_path / "drop.h5"
-        save_record(short, path)
-        used = []
-        for _ in range(3):
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            read_record(path, machine)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            used.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-        assert min(used) < 0.3
