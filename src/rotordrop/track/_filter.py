@@ -239,7 +239,7 @@ def predict(
             P[k, j] = head[j, k]
     noise_step(x, P, form)
     unknown_impulses(settings, impulses, sigma)
-    add_process_noise(time[i], P, p, settings, sigma, drift_at(time[i], targets, settings))
+    add_process_noise(P, p, settings, sigma, drift_at(time[i], targets, settings))
     # Rounding leaves what has moved lopsided by a little, and sample by sample the error would grow.
     symmetrise(P, s)
     if segment.F.shape[0] > 0:
@@ -496,7 +496,7 @@ def smooth_means(
             fresh = (1.0 - decay * decay) * form.noise_variance[m]
             moved[a] = decay * away[a] - fresh * scores[i, a]
         drift = drift_at(time[i], targets, settings)
-        subtract_process_noise(time[i], scores[i], p, settings, segment.sigma[i], drift, moved)
+        subtract_process_noise(scores[i], p, settings, segment.sigma[i], drift, moved)
         for a in range(n):
             smoothed[i, a] = segment.x[i, a] + moved[a]
         for c in range(segment.S.shape[1]):

@@ -82,7 +82,7 @@ class FilterSettings(NamedTuple):
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
-    drift of the parameters holds. Before ``fall_end`` [s] unknown impulses act on the rotor alone.
+    drift of the parameters holds.
     """
 
     dt: float
@@ -94,7 +94,6 @@ class FilterSettings(NamedTuple):
     spin_noise: float
     speed_noise: float
     learning_end: float
-    fall_end: float
 
 
 @kernel
@@ -421,11 +420,12 @@ def unknown_impulses(settings: FilterSettings, impulses: Array, sigmas: Array) -
 
 
 @kernel
-def unit_impulses(t: float, p: KernelParameters, settings: FilterSettings) -> tuple[Array, Integers]:
+def unit_impulses(p: KernelParameters, settings: FilterSettings, sigmas: Array) -> tuple[Array, Integers]:
     """Velocities that unit impulses between rotor and race give, and where they stand, shape (2 B, m + 1).
 
-    They are equal and opposite, in x and y of each bearing; modes have unit mass. Before the first contact
-    they act on the rotor alone: nothing touches a race then, and a light one would be made to ring.
+    They are equal and opposite, in x and y of each bearing; modes have unit mass. Where the rotor does not
+    touch the race, so that ``sigmas`` (B,) [N s] has no share of an impulse, they act on the rotor alone: a
+    light race would be made to ring.
     """
     m, n_q, n_b = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.bearing.shape[0]
     g, place = np.empty((2 * n_b, m + 1)), np.empty((2 * n_b, m + 1), dtype=np.int64)
@@ -434,7 +434,7 @@ def unit_impulses(t: float, p: KernelParameters, settings: FilterSettings) -> tu
         for k in range(m):
             g[r, k] = -p.bearing_shape[b, k]
             place[r, k] = n_q + p.rotor_at[L.MODES_X + axis] + k
-        g[r, m] = 0.0 if t < settings.fall_end else 1.0 / p.bearing[b, L.RACE_MASS]
+        g[r, m] = 1.0 / p.bearing[b, L.RACE_MASS] if sigmas[b] > settings.impulse else 0.0
         place[r, m] = n_q + p.bearing_at[b, L.RACE] + axis
     return g, place
 
@@ -456,7 +456,7 @@ def own_noise(n: int, p: KernelParameters, settings: FilterSettings, sigmas: Arr
 
 @kernel
 def add_process_noise(
-    t: float, P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
+    P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
 ) -> None:
     """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P`` (n, n).
 
@@ -464,7 +464,7 @@ def add_process_noise(
     """
     # Process noise enters where the model errs: as an impulse between rotor and race. White noise on every
     # state would let the filter explain a record by motions that nothing can cause.
-    g, place = unit_impulses(t, p, settings)
+    g, place = unit_impulses(p, settings, sigmas)
     for r in range(g.shape[0]):
         sigma = sigmas[r // 2]
         for i in range(g.shape[1]):
@@ -477,7 +477,6 @@ def add_process_noise(
 
 @kernel
 def subtract_process_noise(
-    t: float,
     score: Array,
     p: KernelParameters,
     settings: FilterSettings,
@@ -486,7 +485,7 @@ def subtract_process_noise(
     out: Array,
 ) -> None:
     """Take off ``out`` (n,) the product of what `add_process_noise` adds with ``score`` (n,)."""
-    g, place = unit_impulses(t, p, settings)
+    g, place = unit_impulses(p, settings, sigmas)
     for r in range(g.shape[0]):
         sigma, along = sigmas[r // 2], 0.0
         for i in range(g.shape[1]):

@@ -60,11 +60,10 @@ class PassSettings:
     law near zero speed decides, which no record of positions shows, and must not rewrite what the first
     impacts said."""
 
-    def for_sampling(self, dt: float, fastest: float = 0.0, contact: float = 0.0) -> P.FilterSettings:
+    def for_sampling(self, dt: float, fastest: float = 0.0) -> P.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
 
         ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
-        ``contact`` [s] is when the fall ends.
         """
         growth = math.sqrt(dt / REFERENCE_STEP)
         phase = fastest * dt
@@ -81,7 +80,6 @@ class PassSettings:
             spin_noise=self.spin_noise * growth,
             speed_noise=self.speed_noise * growth,
             learning_end=self.learning_end,
-            fall_end=contact,
         )
 
 
@@ -245,7 +243,7 @@ def forward(
     dt = float(problem.time[1] - problem.time[0])
     found = Forward(
         problem=problem,
-        settings=settings.for_sampling(dt, fastest_frequency(problem), problem.first_contact),
+        settings=settings.for_sampling(dt, fastest_frequency(problem)),
         impulse=settings.impulse,
         prior=np.ascontiguousarray(mean),
         reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),

@@ -23,7 +23,7 @@ class PlainFilter:
     def __init__(self, problem, settings=SETTINGS):
         self.problem = problem
         dt = float(problem.time[1] - problem.time[0])
-        self.numbers = settings.for_sampling(dt, fastest_frequency(problem), problem.first_contact)
+        self.numbers = settings.for_sampling(dt, fastest_frequency(problem))
         self.means, self.covariances, self.predicted, self.matrices = [], [], [], []
         self.innovations = []
 
@@ -59,7 +59,7 @@ class PlainFilter:
         noise[parts, parts] = (1.0 - form.noise_decay**2) * form.noise_variance
         sigmas = np.empty_like(impulses)
         P.unknown_impulses(self.numbers, impulses, sigmas)
-        P.add_process_noise(problem.time[i], noise, p, self.numbers, sigmas, problem.targets.drift)
+        P.add_process_noise(noise, p, self.numbers, sigmas, problem.targets.drift)
         self.matrices.append(whole)
         return np.concatenate([y[:s], whole[s:, s:] @ mean[s:]]), whole @ covariance @ whole.T + noise
 
