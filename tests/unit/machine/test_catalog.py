@@ -139,7 +139,9 @@ def test_every_one_of_them_is_found_or_inferred(written):
     assert search_bearings(written)[0] == bearing
 
 
-@pytest.mark.parametrize("written", ["30206", "NU210", "NU7020X99", "22216 E", "paper", "", "51110", "16016"])
+@pytest.mark.parametrize(
+    "written", ["30206", "NU210", "NU7020X99", "22216 E", "paper", "", "51110", "16016", "6212/C3, 7012 ACD"]
+)
 def test_bearings_of_other_kinds_are_not_read_as_one_of_these(written):
     assert read_designation(written) is None
 

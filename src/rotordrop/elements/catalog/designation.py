@@ -117,12 +117,12 @@ class Designation:
 
 
 def read_designation(text: str) -> Designation | None:
-    """Read a designation; None where no series of these bearings stands in it.
+    """Read a designation; None where no series of these bearings stands in it, or two in a list.
 
     Prefixes and suffixes of cage, seal, accuracy and grease say nothing here and are passed over.
     """
     read = _read(text)
-    if read is None:
+    if read is None or sum(_read(part) is not None for part in re.split("[,;]", text)) > 1:
         return None
     words = [found for found in re.finditer(r"[A-Za-z0-9]+", text) if not _CORE.search(found[0].upper())]
     without = {found: _read(f"{text[: found.start()]} {text[found.end() :]}") for found in words}
