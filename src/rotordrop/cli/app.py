@@ -260,17 +260,12 @@ def _print_log() -> None:
     log.setLevel(logging.INFO)
 
 
-def _give_memory_back() -> None:
-    """Have glibc return large arrays when they go: else it keeps what a fit once needed."""
-    if sys.platform == "linux":
+def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
+    """Entry point of the command ``rotordrop``, or of another program with verbs of its own."""
+    if sys.platform == "linux":  # else glibc keeps what a fit once needed
         with suppress(AttributeError):  # another C library
             for option, value in ((_MMAP_THRESHOLD, 1 << 24), (_TRIM_THRESHOLD, 1 << 26), (_ARENA_MAX, 1)):
                 ctypes.CDLL(None).mallopt(option, value)
-
-
-def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
-    """Entry point of the command ``rotordrop``, or of another program with verbs of its own."""
-    _give_memory_back()
     for variable, number in ENVIRONMENT.items():
         os.environ.setdefault(variable, number)
     open_streams()
