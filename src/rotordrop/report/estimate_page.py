@@ -94,7 +94,7 @@ PRIOR_NOTE = (
     "Priors are ranges (90 %), below an estimate stands its 90 % interval. What the record does not "
     "determine enters the intervals of force and stress by its prior."
 )
-SENSORS_NOTE = "Gains and offsets are estimated with the motion; the settled tail ties them to the air gap."
+SENSORS_NOTE = "The gain of a machine file, true displacement over reading, is 1 / (1 + gain error)."
 PHASE_NOTE = "Phase: direction of the heavy spot when the mark of the shaft passes, from +y with the spin."
 CHECKS_NOTE = (
     "The checks see what moves the readings; a contact stiffness or exponent that hardly does enters by its "
