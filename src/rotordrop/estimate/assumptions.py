@@ -51,7 +51,9 @@ def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...
 def left_to_assumption(problem: DropProblem) -> dict[str, str]:
     """What most machine files do not state, in a few words, by the note that says more."""
     return {
-        note: words for part in (_zeros, _gains, _lag, _races, _thrust, _air) for note, words in part(problem)
+        note: words
+        for part in (_zeros, _plays, _gains, _lag, _races, _thrust, _air)
+        for note, words in part(problem)
     }
 
 
@@ -141,6 +143,19 @@ def _races(problem: DropProblem) -> Iterator[tuple[str, str]]:
         "rotor; race.mass and race.inertia in the machine file take it into account",
         "races by bearing size",
     )
+
+
+def _plays(problem: DropProblem) -> Iterator[tuple[str, str]]:
+    """Play of loose races: a record shows it and the air gap together."""
+    plays = np.zeros((2, 0)) if problem.model.play is None else problem.model.play
+    for name, play, sigma in zip(problem.model.bearing_names, *plays, strict=False):
+        if sigma > 0.0:
+            taken = format_quantity(float(play), "length")
+            yield (
+                f"no drop tells the play at {name}, half the clearance and what balls give way, from the air "
+                f"gap: {taken} is taken, and what is wrong with it is in the gap",
+                f"{name} play {taken}",
+            )
 
 
 def _thrust(problem: DropProblem) -> Iterator[tuple[str, str]]:

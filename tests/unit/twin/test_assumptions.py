@@ -14,6 +14,7 @@ from rotordrop.estimate.estimate import PlaneUnbalance, unbalance_notes
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY
+from rotordrop.rotor.parameters import held_lightly
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, with_end_planes, with_sensors_of
 from rotordrop.twin.steps import BEYOND, DESCRIBED, FORM, GUESSES, LASTS, WEIGHED, WHOLE, Steps
 from rotordrop.twin.tracked_estimate import plane_unbalances, polar_of
@@ -53,6 +54,16 @@ def test_assumptions_are_said_with_their_numbers(machine, evidence):
     for sensor in machine.sensors:
         assert f"{sensor.name}: no levitated readings tell its noise; 0." in text
     assert "no levitated readings" not in said(machine, evidence)
+
+
+def test_the_play_of_a_loose_race_is_said(machine, evidence):
+    assert "no drop tells the play" not in said(machine, evidence)
+    bearing = {"designation": "6015", "clearance": "20 um"}
+    ends = [one.changed(bearing=bearing) for one in machine.touchdown_bearings]
+    loose = machine.changed(touchdown_bearings=ends)
+    problem = drop_problem(held_lightly(build_drop_model(loose, COARSE_BASIS)), evidence, until=UNTIL)
+    assert f"NDE play {1e6 * problem.model.play[0, 0]:.1f} µm" in left_to_assumption(problem).values()
+    assert 10e-6 < problem.model.play[0, 0] < 12e-6
 
 
 def test_gains_and_bandwidths_that_nobody_stated_are_said(machine, evidence):
