@@ -247,16 +247,18 @@ def _discard_standard_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+class _ToStandardError(logging.Handler):
+    """Writes above a progress bar, which replaces the stream."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError, ValueError):  # whoever read it has gone
+            print(printable(record.getMessage()), file=sys.stderr)
+
+
 def _print_log() -> None:
     """Show on standard error what the package logs, such as that kernels are compiled."""
-
-    def emit(record: logging.LogRecord) -> None:
-        with suppress(OSError, ValueError):  # whoever read it has gone
-            print(printable(record.getMessage()), file=sys.stderr)  # above a bar, which replaces the stream
-
-    log, handler = logging.getLogger("rotordrop"), logging.Handler()
-    handler.emit = emit  # type: ignore[method-assign]
-    log.addHandler(handler)
+    log = logging.getLogger("rotordrop")
+    log.addHandler(_ToStandardError())
     log.setLevel(logging.INFO)
 
 

@@ -147,14 +147,16 @@ def _races(problem: DropProblem) -> Iterator[tuple[str, str]]:
 
 def _plays(problem: DropProblem) -> Iterator[tuple[str, str]]:
     """Play of loose races: a record shows it and the air gap together."""
-    plays = np.zeros((2, 0)) if problem.model.play is None else problem.model.play
-    for name, play, sigma in zip(problem.model.bearing_names, *plays, strict=False):
-        if sigma > 0.0:
-            taken = format_quantity(float(play), "length")
+    plays = problem.model.play
+    if plays is None:
+        return
+    for b, name in enumerate(problem.model.bearing_names):
+        if problem.model.play_sigma(b) > 0.0:
+            taken = format_quantity(float(plays[0, b]), "length")
             yield (
                 f"no drop tells the play at {name}, half the clearance and what balls give way, from the air "
                 f"gap: {taken} is taken, and what is wrong with it is in the gap",
-                f"{name} play {taken}",
+                f"{name} play under load {taken}",
             )
 
 

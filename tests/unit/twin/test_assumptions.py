@@ -62,7 +62,9 @@ def test_the_play_of_a_loose_race_is_said(machine, evidence):
     ends = [one.changed(bearing=bearing) for one in machine.touchdown_bearings]
     loose = machine.changed(touchdown_bearings=ends)
     problem = drop_problem(held_lightly(build_drop_model(loose, COARSE_BASIS)), evidence, until=UNTIL)
-    assert f"NDE play {1e6 * problem.model.play[0, 0]:.1f} µm" in left_to_assumption(problem).values()
+    assert (
+        f"NDE play under load {1e6 * problem.model.play[0, 0]:.1f} µm" in left_to_assumption(problem).values()
+    )
     assert 10e-6 < problem.model.play[0, 0] < 12e-6
 
 
