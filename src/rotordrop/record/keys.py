@@ -111,13 +111,9 @@ def _word(key: str) -> str:
 
 def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
     """The clock by keys and values, numbers or texts; its unit in the value, the key, beside it, or s."""
-    # some recorders write Trigger: Sample 500
-    split = ((k, v, *str(v).partition(" ")[::2]) for k, v in entries.items())
-    said = [
-        (f"{k} {w}", n) if n.isdigit() and kind_of(f"{k} {w}") == "trigger" else (k, v)
-        for k, v, w, n in split
-    ]
-    found = {kind: [(k, v) for k, v in said if kind_of(k) == kind] for kind in (*_CLOCK, "time unit")}
+    found = {
+        kind: [(k, v) for k, v in entries.items() if kind_of(k) == kind] for kind in (*_CLOCK, "time unit")
+    }
     units = (known_unit(str(value).partition(" ")[0]) for _, value in found["time unit"])
     time_unit = next(filter(None, units), unit)
     found["start"].sort(key=lambda one: list(_KINDS).index(_word(one[0])))

@@ -673,7 +673,6 @@ REPORTED = [
             ("Fs: 10 kHz\nPoint de d\u00e9clenchement : 500\n".encode(), NAMES, "um", ""),
             ("Fs: 10 kHz\nPr\u00e9-d\u00e9clenchement : 50 ms\n".encode(), NAMES, "um", ""),
             (b"# Fs 10 kHz\nPretrigger: 500 samples\nTriggerpunkt,500\n", NAMES, "um", ""),
-            (b"Fs: 10 kHz\nTrigger: Sample 500\n", NAMES, "um", ""),
             (b"Interval;0.1 ms\nPretrig,50,ms\n".replace(b";", b","), NAMES, "um", ""),
             (b"Fs: 10 kHz\nTstart: -0.05\nXOffset: 7 div\n", NAMES, "um", "not used.*XOffset = 7 div"),
         )
